@@ -1,0 +1,1 @@
+//! The tiled SIMD rasterizer with a visibility buffer.

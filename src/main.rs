@@ -1,0 +1,2 @@
+//! The `specula` program.
+fn main() {}

@@ -1,0 +1,5 @@
+//! Framebuffers, encodings and image files.
+
+pub mod frame;
+
+pub use frame::Frame;
