@@ -1,0 +1,71 @@
+//! Shading methods.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// How an image is shaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Method {
+    /// One colour per triangle, at its centroid with its face normal.
+    Flat,
+    /// The illumination equation at the vertices, colours interpolated.
+    Gouraud,
+    /// The illumination equation at every pixel.
+    Phong,
+    /// Gouraud first, then refinement by error and cost until the budget is spent.
+    #[default]
+    Adaptive,
+    /// Gouraud first, then per-pixel Phong, triangles with most visible pixels first: the simple rival of
+    /// [`Adaptive`](Self::Adaptive).
+    PhongArea,
+}
+
+impl Method {
+    /// All methods.
+    pub const ALL: [Self; 5] = [
+        Self::Flat,
+        Self::Gouraud,
+        Self::Phong,
+        Self::Adaptive,
+        Self::PhongArea,
+    ];
+
+    /// The name used on the command line and in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Gouraud => "gouraud",
+            Self::Phong => "phong",
+            Self::Adaptive => "adaptive",
+            Self::PhongArea => "phong-area",
+        }
+    }
+
+    /// Whether frames go on refining the image, so that a budget makes a difference.
+    #[must_use]
+    pub fn is_progressive(self) -> bool {
+        matches!(self, Self::Adaptive | Self::PhongArea)
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Method {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL
+            .into_iter()
+            .find(|method| method.name() == text)
+            .ok_or_else(|| {
+                let names = Self::ALL.map(Self::name).join(", ");
+                format!("no method is called '{text}'; there are {names}")
+            })
+    }
+}

@@ -1,0 +1,175 @@
+//! What happened in a frame.
+
+use crate::schedule::Budget;
+use std::fmt;
+
+/// How far a frame came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Outcome {
+    /// The image is final: it equals the method's own best.
+    Complete,
+    /// The first image was drawn, and refined as far as the budget went.
+    Refined,
+    /// There was time for the first image only; if even that took longer than the budget, the frame is late.
+    BaseOnly,
+    /// Nothing was left to do: the image was final already.
+    Unchanged,
+}
+
+impl Outcome {
+    /// The name used in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Complete => "complete",
+            Self::Refined => "refined",
+            Self::BaseOnly => "base_only",
+            Self::Unchanged => "unchanged",
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Milliseconds spent in each stage of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageTimes {
+    /// Culling clusters.
+    pub cull: f64,
+    /// Illuminating vertices.
+    pub shade: f64,
+    /// Highlight sign tests, and collecting candidates for refinement.
+    pub classify: f64,
+    /// Transforming, binning and rasterizing: who owns which pixel.
+    pub raster: f64,
+    /// Subdividing, illuminating new vertices, repainting and per-pixel shading.
+    pub refine: f64,
+    /// Colouring the first image, and bringing the caller's frame up to date.
+    pub resolve: f64,
+}
+
+/// What a frame did not need to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Skipped {
+    /// Clusters outside of the view.
+    pub clusters_off_screen: u64,
+    /// Clusters that face away.
+    pub clusters_facing_away: u64,
+    /// Triangles that face away (in clusters that do not as a whole).
+    pub triangles_facing_away: u64,
+    /// Triangles outside of the view or between pixels.
+    pub triangles_off_screen: u64,
+    /// Triangles drawn of which no pixel is visible.
+    pub triangles_hidden: u64,
+    /// Visible triangles whose material has no specular term: no highlight test.
+    pub triangles_matte: u64,
+    /// Triangles whose first image is proved right: never refined.
+    pub triangles_proved: u64,
+    /// Light terms (diffuse or specular, of one light on one triangle) proved not to need evaluation.
+    pub light_terms: u64,
+    /// Tiles that nothing covers.
+    pub background_tiles: u64,
+    /// Pixels of the caller's frame that were right already.
+    pub pixels_unchanged: u64,
+}
+
+impl Skipped {
+    /// Names and values, in the order of the fields, for reports.
+    #[must_use]
+    pub fn entries(&self) -> [(&'static str, u64); 10] {
+        [
+            ("clusters_off_screen", self.clusters_off_screen),
+            ("clusters_facing_away", self.clusters_facing_away),
+            ("triangles_facing_away", self.triangles_facing_away),
+            ("triangles_off_screen", self.triangles_off_screen),
+            ("triangles_hidden", self.triangles_hidden),
+            ("triangles_matte", self.triangles_matte),
+            ("triangles_proved", self.triangles_proved),
+            ("light_terms", self.light_terms),
+            ("background_tiles", self.background_tiles),
+            ("pixels_unchanged", self.pixels_unchanged),
+        ]
+    }
+}
+
+/// What happened in a frame.
+///
+/// Times and work are this frame's; counts of triangles and candidates describe the image it left behind.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameStats {
+    /// Frames this engine has rendered before.
+    pub frame: u64,
+    /// Milliseconds from call to return.
+    pub frame_ms: f64,
+    /// What the frame was allowed to cost.
+    pub budget: Budget,
+    /// How far it came.
+    pub outcome: Outcome,
+    /// Whether the image is final.
+    pub converged: bool,
+    /// Estimated root mean square difference from per-pixel Phong shading, in 8-bit codes over covered pixels; 0
+    /// for [`Method::Phong`](super::Method::Phong). For flat shading, which is not compared with anything, NaN.
+    pub estimated_error: f64,
+    /// Triangles of the scene.
+    pub triangles: u64,
+    /// Triangles sent to the rasterizer's tiles for this image.
+    pub triangles_drawn: u64,
+    /// Triangles that own at least one pixel.
+    pub triangles_visible: u64,
+    /// Triangles that pass the paper's H1 and H2 tests for some light, among those drawn with visible pixels or hidden
+    /// by others.
+    pub pht: u64,
+    /// Those of them that own at least one pixel.
+    pub pht_visible: u64,
+    /// Those of the visible ones that have been refined so far (subdivided or shaded per pixel).
+    pub refined: u64,
+    /// Triangles subdivided so far.
+    pub triangles_subdivided: u64,
+    /// Leaves of all subdivisions.
+    pub leaves: u64,
+    /// Pixels shaded by the illumination equation so far.
+    pub phong_pixels: u64,
+    /// Nominal nanoseconds of refinement in this frame.
+    pub work_units: u64,
+    /// Pixels written to the caller's frame.
+    pub pixels_written: u64,
+    /// Milliseconds by stage.
+    pub stage_ms: StageTimes,
+    /// What was not needed.
+    pub skipped: Skipped,
+}
+
+impl FrameStats {
+    /// Milliseconds past the deadline; negative when the frame was early, `None` without a wall-clock budget.
+    #[must_use]
+    pub fn overshoot_ms(&self) -> Option<f64> {
+        match self.budget {
+            Budget::Millis(ms) => Some(self.frame_ms - ms),
+            Budget::Work(_) | Budget::Unlimited => None,
+        }
+    }
+}
+
+impl fmt::Display for FrameStats {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "frame {}: {} in {:.2} ms, error about {:.2} codes, {} of {} visible PHTs refined",
+            self.frame,
+            self.outcome,
+            self.frame_ms,
+            self.estimated_error,
+            self.refined,
+            self.pht_visible,
+        )?;
+        if self.converged {
+            write!(f, ", converged")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,132 @@
+//! What a frame may cost, and how much of it is left.
+
+use crate::clock::Clock;
+
+/// What one frame may cost.
+///
+/// The first image of a frame, the Gouraud-shaded one, is always completed; the budget decides how much refinement
+/// follows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Budget {
+    /// Wall-clock milliseconds from the call of `render` to its return, by the engine's clock. Refinement stops in time;
+    /// a first image that takes longer is completed late, and the outcome says so.
+    Millis(f64),
+    /// Work units: nominal nanoseconds of refinement (see [`cost`](super::cost)). The result is the same, bit for
+    /// bit, for any number of threads and at any speed of the machine.
+    Work(u64),
+    /// Refine until the image equals per-pixel Phong shading.
+    Unlimited,
+}
+
+impl Budget {
+    /// A wall-clock budget in milliseconds. Negative and NaN count as zero: the first image only.
+    #[must_use]
+    pub fn from_millis(ms: f64) -> Self {
+        Self::Millis(if ms > 0.0 { ms } else { 0.0 })
+    }
+}
+
+/// A budget being spent.
+#[derive(Clone, Copy, Debug)]
+pub struct Allowance<'a> {
+    budget: Budget,
+    clock: &'a dyn Clock,
+    start_ms: f64,
+    reserve_ms: f64,
+    spent_units: u64,
+}
+
+impl<'a> Allowance<'a> {
+    /// Starts to spend `budget` at `start_ms` of `clock`.
+    #[must_use]
+    pub fn new(budget: Budget, clock: &'a dyn Clock, start_ms: f64) -> Self {
+        Self {
+            budget,
+            clock,
+            start_ms,
+            reserve_ms: 0.0,
+            spent_units: 0,
+        }
+    }
+
+    /// Keeps `ms` of a wall-clock budget for what comes after refinement.
+    pub fn reserve_ms(&mut self, ms: f64) {
+        self.reserve_ms = ms.max(0.0);
+    }
+
+    /// Whether a piece of work of `units` nominal nanoseconds may still start. For a wall-clock budget it may while the
+    /// deadline, less the reserve and the piece's nominal time, lies ahead.
+    #[must_use]
+    pub fn admits(&self, units: u64) -> bool {
+        match self.budget {
+            Budget::Unlimited => true,
+            Budget::Work(total) => self.spent_units.saturating_add(units) <= total,
+            Budget::Millis(ms) => {
+                let needed = units as f64 * 1e-6 + self.reserve_ms;
+                self.elapsed_ms() + needed <= ms
+            }
+        }
+    }
+
+    /// Work units that the next piece may take at most.
+    #[must_use]
+    pub fn units_left(&self) -> u64 {
+        match self.budget {
+            Budget::Work(total) => total.saturating_sub(self.spent_units),
+            Budget::Millis(_) | Budget::Unlimited => u64::MAX,
+        }
+    }
+
+    /// Books `units` of finished work.
+    pub fn spend(&mut self, units: u64) {
+        self.spent_units = self.spent_units.saturating_add(units);
+    }
+
+    /// Work units booked so far.
+    #[must_use]
+    pub fn spent_units(&self) -> u64 {
+        self.spent_units
+    }
+
+    /// Milliseconds since the start; zero when the clock has run backwards.
+    #[must_use]
+    pub fn elapsed_ms(&self) -> f64 {
+        (self.clock.now_ms() - self.start_ms).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::ManualClock;
+
+    #[test]
+    fn no_work_is_admitted_past_the_deadline_or_into_the_reserve() {
+        let clock = ManualClock::default();
+        let mut allowance = Allowance::new(Budget::from_millis(2.0), &clock, clock.now_ms());
+        allowance.reserve_ms(0.5);
+        assert!(allowance.admits(1_500_000));
+        assert!(!allowance.admits(1_500_001));
+        clock.advance_ms(1.5);
+        assert!(allowance.admits(0));
+        clock.advance_ms(0.001);
+        assert!(!allowance.admits(0));
+    }
+
+    #[test]
+    fn work_budgets_do_not_look_at_the_clock() {
+        let clock = ManualClock::default();
+        let mut allowance = Allowance::new(Budget::Work(100), &clock, 0.0);
+        clock.advance_ms(1e6);
+        assert!(allowance.admits(100));
+        allowance.spend(60);
+        assert!(!allowance.admits(41));
+        assert_eq!(allowance.units_left(), 40);
+    }
+
+    #[test]
+    fn odd_milliseconds_are_no_time_at_all() {
+        assert_eq!(Budget::from_millis(f64::NAN), Budget::Millis(0.0));
+        assert_eq!(Budget::from_millis(-3.0), Budget::Millis(0.0));
+    }
+}
