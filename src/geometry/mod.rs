@@ -2,6 +2,7 @@
 
 pub mod bary;
 pub mod screen;
+pub mod shapes;
 
 pub use bary::Bary;
 
