@@ -1,10 +1,14 @@
 //! What is rendered: meshes, their topology and clusters, shapes, and the rules by which a triangle becomes pixels.
 
 pub mod bary;
+pub mod clusters;
 pub mod screen;
 pub mod shapes;
+pub mod topology;
 
 pub use bary::Bary;
+pub use clusters::{Cluster, build_clusters};
+pub use topology::Topology;
 
 use glam::DVec3;
 
