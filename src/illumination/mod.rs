@@ -3,9 +3,11 @@
 pub mod batch;
 pub mod lanes;
 pub mod lights;
+pub mod points;
 pub mod power;
 pub mod reference;
 
 pub use batch::{shade_points, shade_vertices};
 pub use lanes::{ShadingKit, shade_lanes};
 pub use lights::{ActiveLights, LightMask, MAX_LIGHTS};
+pub use points::PointBatch;

@@ -1,6 +1,7 @@
 //! A scene made ready for rendering: world space, `f32`, one array per component.
 
 use crate::geometry::Vec3s;
+use crate::geometry::topology::Topology;
 use glam::DVec3;
 
 /// All triangles, lights and materials of a scene in [world space](crate::math).
@@ -18,6 +19,8 @@ pub struct World {
     pub triangles: Vec<[u32; 3]>,
     /// Material index of each triangle.
     pub triangle_material: Vec<u16>,
+    /// Welded.
+    pub topology: Topology,
     /// Materials.
     pub materials: Vec<ShadingMaterial>,
     /// Lights.

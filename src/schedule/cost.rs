@@ -20,6 +20,9 @@ pub const LEAF_NS: f32 = 250.0;
 /// Bounding one light on one triangle.
 pub const BOUND_LIGHT_NS: f32 = 60.0;
 
+/// Copying a pixel into the caller's frame.
+pub const PRESENT_PIXEL_NS: f32 = 0.5;
+
 /// Illuminating `vertices` points under `lights` lights.
 #[must_use]
 pub fn vertices(vertices: f32, lights: usize) -> f32 {
@@ -36,6 +39,12 @@ pub fn repaint(pixels: f32) -> f32 {
 #[must_use]
 pub fn phong(pixels: f32, lights: usize) -> f32 {
     LEAF_NS + pixels * (PHONG_PIXEL_NS + PHONG_PIXEL_LIGHT_NS * lights as f32)
+}
+
+/// Copying `pixels` pixels into the caller's frame.
+#[must_use]
+pub fn present(pixels: u64) -> f32 {
+    pixels as f32 * PRESENT_PIXEL_NS
 }
 
 /// Bounding `lights` lights on a triangle.

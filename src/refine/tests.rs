@@ -1,0 +1,261 @@
+//! Random walks through refinement: whatever is split, the leaves stay a conforming partition.
+
+use super::forest::NONE;
+use super::{Forest, LeafId, LeafState, SplitOutcome};
+use crate::geometry::topology::Topology;
+use crate::geometry::{Bary, Mesh, Vec3s, shapes};
+use crate::parallel::Exec;
+use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, World};
+use crate::simd::SimdLevel;
+use std::collections::{HashMap, HashSet};
+
+/// Numerical Recipes' linear congruential generator: good enough to pick leaves.
+struct Random(u32);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (self.0 >> 8) as usize % n
+    }
+}
+
+fn exec() -> Exec {
+    Exec {
+        level: SimdLevel::detect().token().expect("detected"),
+        threads: 1,
+    }
+}
+
+fn world_of(mesh: &Mesh) -> World {
+    let mut world = World {
+        materials: vec![ShadingMaterial {
+            ambient: [0.02; 3],
+            diffuse: [0.6, 0.3, 0.2],
+            specular: [0.6; 3],
+            shininess: 40.0,
+            model: ReflectionModel::Phong,
+            two_sided: false,
+        }],
+        lights: vec![ShadingLight {
+            vector: [2.0, 1.0, 3.0],
+            is_point: true,
+            radiance: [1.0; 3],
+        }],
+        triangles: mesh.triangles.clone(),
+        triangle_material: vec![0; mesh.triangles.len()],
+        vertex_material: vec![0; mesh.positions.len()],
+        ..World::default()
+    };
+    for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
+        world.positions.push(p.as_vec3().to_array());
+        world.normals.push(n.as_vec3().to_array());
+    }
+    world.topology = Topology::new(&world.positions, &world.triangles);
+    world
+}
+
+const EYE: Eye = Eye::Point([4.0, 0.5, 1.0]);
+
+fn base_colours(world: &World) -> Vec3s {
+    let mut colours = Vec3s::default();
+    colours.resize(world.positions.len());
+    let all: Vec<u32> = (0..world.positions.len() as u32).collect();
+    crate::illumination::shade_vertices(exec().level, world, EYE, &all, &mut colours);
+    colours
+}
+
+/// Plants some roots and splits random edges of random leaves; calls `check` after every round.
+fn walk(world: &World, seed: u32, rounds: usize, mut check: impl FnMut(&Forest, &Vec3s)) {
+    let colours = base_colours(world);
+    let mut forest = Forest::default();
+    forest.reset(world);
+    let mut random = Random(seed);
+    let (mut planted, mut outcomes) = (Vec::new(), Vec::new());
+    for _ in 0..rounds {
+        let triangle = random.below(world.triangles.len()) as u32;
+        forest.plant(world, &colours, triangle, 1000);
+        for _ in 0..4 {
+            let open = open_leaves(&forest);
+            if open.is_empty() {
+                continue;
+            }
+            let leaf = open[random.below(open.len())];
+            let marks = 1 + random.below(7) as u8;
+            forest.plan_split(world, &colours, leaf, marks, |_| 1000);
+        }
+        forest.illuminate(exec(), world, EYE, &colours, &mut planted);
+        outcomes.clear();
+        forest.conclude_splits(world, &mut outcomes);
+        if let Some(SplitOutcome::Committed { children, .. }) = outcomes.first() {
+            // Some leaves are finished early.
+            if random.below(8) == 0 {
+                forest.close(world, children.start);
+            }
+        }
+        check(&forest, &colours);
+    }
+    let splits = forest.leaves.iter().filter(|l| l.state == LeafState::Split);
+    assert!(splits.count() > rounds / 4, "the walk has split something");
+}
+
+fn open_leaves(forest: &Forest) -> Vec<LeafId> {
+    (0..forest.leaves.len() as LeafId)
+        .filter(|&id| forest.leaf(id).state == LeafState::Open)
+        .collect()
+}
+
+fn meshes() -> Vec<World> {
+    let cuboid = shapes::cuboid(glam::DVec3::new(1.0, 2.0, 0.5));
+    let mut fan = shapes::plane(1.0, 1.0, 1, 1);
+    // A third triangle on the diagonal makes it a non-manifold edge.
+    let [a, _, c] = fan.triangles[0];
+    fan.positions.push(glam::DVec3::new(0.1, 0.2, 1.0));
+    fan.normals.push(glam::DVec3::Z);
+    fan.triangles.push([a, c, fan.positions.len() as u32 - 1]);
+    [shapes::sphere(8, 5), cuboid, fan, shapes::teapot(2, false)]
+        .iter()
+        .map(world_of)
+        .collect()
+}
+
+#[test]
+fn leaves_partition_their_roots() {
+    for (seed, world) in meshes().iter().enumerate() {
+        walk(world, seed as u32, 120, |forest, _| {
+            let mut area: HashMap<u32, i64> = HashMap::new();
+            for leaf in forest.leaves.iter().filter(|l| l.state != LeafState::Split) {
+                let doubled = Bary::doubled_area(leaf.corners);
+                assert!(doubled > 0, "no leaf is turned over or empty");
+                *area.entry(leaf.triangle).or_default() += i64::from(doubled);
+            }
+            for (triangle, doubled) in area {
+                assert_eq!(doubled, 1 << 30, "triangle {triangle} is covered once");
+            }
+        });
+    }
+}
+
+#[test]
+fn no_leaf_has_a_vertex_of_another_in_the_middle_of_an_edge() {
+    for (seed, world) in meshes().iter().enumerate() {
+        walk(world, 100 + seed as u32, 120, |forest, _| {
+            let open = open_leaves(forest);
+            let position = |v: u32| forest.vertices.position(world, v).map(f32::to_bits);
+            let used: HashSet<_> = open
+                .iter()
+                .flat_map(|&id| forest.leaf(id).vertices.map(position))
+                .collect();
+            for &id in &open {
+                let leaf = forest.leaf(id);
+                for (k, &midpoint) in leaf.midpoints.iter().enumerate() {
+                    let ends = [leaf.vertices[k], leaf.vertices[(k + 1) % 3]].map(position);
+                    // The edges without length at the lid's pole have no middle.
+                    if midpoint == NONE || ends[0] == ends[1] {
+                        continue;
+                    }
+                    assert!(
+                        !used.contains(&position(midpoint)),
+                        "leaf {id} of triangle {} has a T-junction",
+                        leaf.triangle
+                    );
+                }
+            }
+        });
+    }
+}
+
+#[test]
+fn leaves_that_meet_at_an_edge_of_a_smooth_mesh_share_its_vertices() {
+    let world = world_of(&shapes::sphere(8, 5));
+    walk(&world, 7, 150, |forest, _| {
+        let mut by_position: HashMap<[u32; 3], u32> = HashMap::new();
+        for id in open_leaves(forest) {
+            for vertex in forest.leaf(id).vertices {
+                let position = forest.vertices.position(&world, vertex).map(f32::to_bits);
+                let first = *by_position.entry(position).or_insert(vertex);
+                assert_eq!(first, vertex, "one colour for each place: no seams");
+            }
+        }
+    });
+}
+
+#[test]
+fn refined_vertices_lie_where_their_barycentrics_say() {
+    let world = world_of(&shapes::teapot(2, false));
+    walk(&world, 3, 100, |forest, _| {
+        for id in open_leaves(forest) {
+            let leaf = forest.leaf(id);
+            let root = world.triangles[leaf.triangle as usize];
+            for (corner, vertex) in leaf.corners.into_iter().zip(leaf.vertices) {
+                let weights = corner.weights();
+                let interpolate = |array: &Vec3s| {
+                    super::forest::blend(weights, root.map(|v| array.get(v as usize)))
+                };
+                let pairs = [
+                    (interpolate(&world.positions), forest.vertices.position(&world, vertex)),
+                    (interpolate(&world.normals), forest.vertices.normal(&world, vertex)),
+                ];
+                for (expected, got) in pairs {
+                    for k in 0..3 {
+                        assert!((expected[k] - got[k]).abs() < 1e-5, "{expected:?} {got:?}");
+                    }
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn committed_splits_lower_the_error_that_dense_sampling_finds() {
+    let world = world_of(&shapes::sphere(8, 5));
+    let colours = base_colours(&world);
+    let mut forest = Forest::default();
+    forest.reset(&world);
+    let (mut planted, mut outcomes) = (Vec::new(), Vec::new());
+    for triangle in 0..world.triangles.len() as u32 {
+        forest.plant(&world, &colours, triangle, 200);
+    }
+    let mut last = f64::INFINITY;
+    for round in 0..4 {
+        let measured = dense_error(&world, &forest, &colours);
+        assert!(measured < last, "round {round}: {measured} after {last}");
+        last = measured;
+        forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+        for id in open_leaves(&forest) {
+            forest.plan_split(&world, &colours, id, 7, |_| 200);
+        }
+        forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+        forest.conclude_splits(&world, &mut outcomes);
+    }
+}
+
+/// Sum over leaves of mean squared error times area, by the reference at many points.
+fn dense_error(world: &World, forest: &Forest, colours: &Vec3s) -> f64 {
+    use crate::illumination::reference;
+    use crate::output::encode::encode;
+    let mut total = 0.0;
+    for id in open_leaves(forest) {
+        let leaf = forest.leaf(id);
+        let corners = forest.colours(colours, id);
+        let points = leaf.vertices.map(|v| forest.vertices.position(world, v));
+        let normals = leaf.vertices.map(|v| forest.vertices.normal(world, v));
+        let area = f64::from(Bary::doubled_area(leaf.corners)) / f64::from(1 << 30);
+        for index in 0..64 {
+            let weights = super::estimate::sample_weights(index);
+            let at = |v: [[f32; 3]; 3]| reference::vector(super::forest::blend(weights, v));
+            let shaded = reference::shade(
+                at(points),
+                at(normals),
+                &EYE,
+                &world.materials[0],
+                &world.lights,
+            );
+            let interpolated = at(corners).to_array();
+            for k in 0..3 {
+                let d = encode(shaded.rgb[k]) - encode(interpolated[k]);
+                total += d * d * area;
+            }
+        }
+    }
+    total
+}

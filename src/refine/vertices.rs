@@ -1,0 +1,155 @@
+//! Vertices that refinement adds to the world's.
+//!
+//! Vertex numbers below the world's vertex count are the world's own; the others index this pool. Each has a
+//! *welded* position number besides: two vertices with the same one are at the same place.
+
+use super::estimate::Samples;
+use crate::geometry::Vec3s;
+use crate::parallel::Exec;
+use crate::scene::{Eye, World};
+use rustc_hash::FxHashMap;
+
+/// Colour, linear RGB.
+pub(super) type Colour = [f32; 3];
+
+/// The refined vertices, in order of creation.
+#[derive(Clone, Debug, Default)]
+pub(super) struct VertexPool {
+    first: u32,
+    positions: Vec3s,
+    normals: Vec3s,
+    colours: Vec3s,
+    /// Encoded colour less encoded interpolated colour of the parents, in codes.
+    surplus: Vec3s,
+    material: Vec<u16>,
+    weld: Vec<u32>,
+    parents: Vec<[u32; 2]>,
+    /// How many have been illuminated.
+    lit: usize,
+    by_vertices: FxHashMap<[u32; 2], u32>,
+    by_weld: FxHashMap<[u32; 2], u32>,
+    next_weld: u32,
+    scratch: Samples,
+}
+
+impl VertexPool {
+    /// Forgets all vertices and keeps the memory.
+    pub(super) fn reset(&mut self, world: &World) {
+        self.first = world.positions.len() as u32;
+        for array in [
+            &mut self.positions,
+            &mut self.normals,
+            &mut self.colours,
+            &mut self.surplus,
+        ] {
+            array.clear();
+        }
+        self.material.clear();
+        self.weld.clear();
+        self.parents.clear();
+        self.lit = 0;
+        self.by_vertices.clear();
+        self.by_weld.clear();
+        // Welded numbers of the world are below its vertex count.
+        self.next_weld = self.first;
+    }
+
+    fn index(&self, vertex: u32) -> Option<usize> {
+        vertex.checked_sub(self.first).map(|index| index as usize)
+    }
+
+    pub(super) fn position(&self, world: &World, vertex: u32) -> [f32; 3] {
+        match self.index(vertex) {
+            Some(index) => self.positions.get(index),
+            None => world.positions.get(vertex as usize),
+        }
+    }
+
+    pub(super) fn normal(&self, world: &World, vertex: u32) -> [f32; 3] {
+        match self.index(vertex) {
+            Some(index) => self.normals.get(index),
+            None => world.normals.get(vertex as usize),
+        }
+    }
+
+    pub(super) fn colour(&self, base_colours: &Vec3s, vertex: u32) -> Colour {
+        match self.index(vertex) {
+            Some(index) => self.colours.get(index),
+            None => base_colours.get(vertex as usize),
+        }
+    }
+
+    /// Surplus of a midpoint over its parents; the world's own vertices have none.
+    pub(super) fn surplus(&self, vertex: u32) -> [f32; 3] {
+        self.index(vertex)
+            .map_or([0.0; 3], |index| self.surplus.get(index))
+    }
+
+    pub(super) fn weld(&self, world: &World, vertex: u32) -> u32 {
+        match self.index(vertex) {
+            Some(index) => self.weld[index],
+            None => world.topology.position_of_vertex[vertex as usize],
+        }
+    }
+
+    /// Vertices that still have to be illuminated.
+    pub(super) fn unlit(&self) -> usize {
+        self.positions.len() - self.lit
+    }
+
+    /// The vertex half way between two of the same object, made if there is none yet.
+    pub(super) fn midpoint(&mut self, world: &World, material: u16, a: u32, b: u32) -> u32 {
+        let key = [a.min(b), a.max(b)];
+        if let Some(&vertex) = self.by_vertices.get(&key) {
+            return vertex;
+        }
+        // Commutative, hence the same bits from both sides of the edge.
+        let half = |p: [f32; 3], q: [f32; 3]| std::array::from_fn(|k| (p[k] + q[k]) * 0.5);
+        let vertex = self.first + self.positions.len() as u32;
+        let position = half(self.position(world, a), self.position(world, b));
+        let normal = half(self.normal(world, a), self.normal(world, b));
+        let weld = self.welded_midpoint(self.weld(world, a), self.weld(world, b));
+        self.positions.push(position);
+        self.normals.push(normal);
+        self.colours.push([0.0; 3]);
+        self.surplus.push([0.0; 3]);
+        self.material.push(material);
+        self.weld.push(weld);
+        self.parents.push([a, b]);
+        self.by_vertices.insert(key, vertex);
+        vertex
+    }
+
+    fn welded_midpoint(&mut self, a: u32, b: u32) -> u32 {
+        if a == b {
+            return a;
+        }
+        let next = self.next_weld;
+        let weld = *self.by_weld.entry([a.min(b), a.max(b)]).or_insert(next);
+        self.next_weld += u32::from(weld == next);
+        weld
+    }
+
+    /// Illuminates the vertices made since the last call, and finds their surplus.
+    pub(super) fn illuminate(&mut self, exec: Exec, world: &World, eye: Eye, base_colours: &Vec3s) {
+        let range = self.lit..self.positions.len();
+        self.lit = range.end;
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.clear();
+        for index in range.clone() {
+            let [a, b] = self.parents[index].map(|v| self.colour(base_colours, v));
+            scratch.push(
+                self.positions.get(index),
+                self.normals.get(index),
+                self.material[index],
+                std::array::from_fn(|k| (a[k] + b[k]) * 0.5),
+            );
+        }
+        scratch.illuminate(exec, world, eye);
+        for (sample, index) in range.enumerate() {
+            self.colours.set(index, scratch.colour(sample));
+            self.surplus.set(index, scratch.deviation(sample));
+        }
+        self.scratch = scratch;
+    }
+}
