@@ -9,8 +9,8 @@
 //!   A larger depth is nearer. `w` is the distance along the viewing direction (1 if orthographic).
 //! * Transforms are named destination-from-source (`pixel_from_world`), so that products read as
 //!   cancellation. Vectors are columns.
-//! * Counter-clockwise triangles, seen from outside, face front. In pixel space, whose y axis points
-//!   down, a front face turns clockwise.
+//! * Counter-clockwise triangles, seen from outside, face front. They turn counter-clockwise as seen on the
+//!   screen too; since y points down in pixel space, the usual formula gives them a negative area there.
 
 use glam::{DMat4, DVec3};
 

@@ -126,14 +126,15 @@ pub fn snap(p: PixelPoint) -> [i32; 2] {
     [grid(p[0]), grid(p[1])]
 }
 
-/// Twice the signed area of a snapped triangle in squared sub-pixels: positive for front faces (see
-/// [`math`](crate::math)).
+/// Twice the signed area of a snapped triangle in squared sub-pixels: positive for front faces, which turn
+/// counter-clockwise as seen on the screen (see [`math`](crate::math)).
 #[inline]
 #[must_use]
 pub fn doubled_area([a, b, c]: [[i32; 2]; 3]) -> i64 {
     let d = |p: [i32; 2], q: [i32; 2]| [i64::from(q[0] - p[0]), i64::from(q[1] - p[1])];
     let (u, v) = (d(a, b), d(a, c));
-    u[0] * v[1] - u[1] * v[0]
+    // The other way round than usual, because y points down.
+    u[1] * v[0] - u[0] * v[1]
 }
 
 /// One edge of a front-facing snapped triangle as `a x + b y + c >= 0`, `x` and `y` in sub-pixels, with the
@@ -149,17 +150,17 @@ pub struct EdgeFunction {
 }
 
 impl EdgeFunction {
-    /// The edge from `p` to `q`, with the triangle's inside on its right hand as seen on the screen.
+    /// The edge from `p` to `q`, with the triangle's inside on its left hand as seen on the screen.
     #[inline]
     #[must_use]
     pub fn new(p: [i32; 2], q: [i32; 2]) -> Self {
         let [px, py] = p.map(i64::from);
         let (dx, dy) = (i64::from(q[0]) - px, i64::from(q[1]) - py);
-        let top_left = dy < 0 || (dy == 0 && dx > 0);
+        let top_left = dy > 0 || (dy == 0 && dx < 0);
         Self {
-            a: -dy,
-            b: dx,
-            c: dy * px - dx * py - i64::from(!top_left),
+            a: dy,
+            b: -dx,
+            c: dx * py - dy * px - i64::from(!top_left),
         }
     }
 
@@ -240,7 +241,7 @@ pub struct TrianglePlanes {
     corners: [PixelPoint; 3],
     /// `v_j x v_k` for the edge opposite to each corner.
     edges: [[f64; 3]; 3],
-    /// `v_0 . (v_1 x v_2)`: negative for faces seen from behind.
+    /// `v_0 . (v_1 x v_2)`: negative for faces seen from the front, because y points down.
     determinant: f64,
 }
 
@@ -411,6 +412,20 @@ mod tests {
     }
 
     #[test]
+    fn a_triangle_that_faces_the_eye_has_a_positive_area() {
+        // The eye at the origin looks along -z, y up: a triangle at z = -1 whose normal is +z faces it.
+        let project = |x: f64, y: f64| snap(corner(50.0 + 10.0 * x, 50.0 - 10.0 * y, 1.0));
+        let front = [project(0.0, 0.0), project(1.0, 0.0), project(0.0, 1.0)];
+        let [a, b, c] = front;
+        assert_eq!(doubled_area(front), 100 << (2 * SUBPIXEL_BITS));
+        assert_eq!(doubled_area([a, c, b]), -(100 << (2 * SUBPIXEL_BITS)));
+        let inside = |t: [[i32; 2]; 3]| {
+            (0..3).all(|i| EdgeFunction::new(t[i], t[(i + 1) % 3]).at_pixel(52, 46) >= 0)
+        };
+        assert!(inside(front) && !inside([a, c, b]));
+    }
+
+    #[test]
     fn a_shared_edge_gives_each_pixel_to_one_side() {
         let (a, b, c, d) = ([128, 128], [2688, 128], [128, 2688], [2688, 2688]);
         let covered = |t: [[i32; 2]; 3], x, y| {
@@ -418,7 +433,7 @@ mod tests {
         };
         for y in 0..10 {
             for x in 0..10 {
-                let sides = u8::from(covered([a, b, c], x, y)) + u8::from(covered([b, d, c], x, y));
+                let sides = u8::from(covered([a, c, b], x, y)) + u8::from(covered([b, c, d], x, y));
                 assert_eq!(sides, 1, "pixel {x} {y}");
             }
         }
