@@ -1,9 +1,9 @@
-//! Clusters: runs of at most [`MAX_TRIANGLES`] triangles that lie close together, with bounds by which a whole run can be
-//! skipped at once.
+//! Clusters: runs of at most [`MAX_TRIANGLES`] triangles that lie close together, with bounds by which a whole run
+//! can be skipped at once.
 //!
 //! The triangles of an object are split recursively in the middle along the longest axis of the box about their
-//! centroids, in proportion to a balanced number of clusters, until a part is one cluster; between 64 and 128 triangles each
-//! unless there are fewer in all. This reorders the triangles, since a cluster is a range of them.
+//! centroids, in proportion to a balanced number of clusters, until a part is one cluster; between 64 and 128
+//! triangles each unless there are fewer in all. This reorders the triangles, since a cluster is a range of them.
 //!
 //! Bounds hold for the stored `f32` positions, rounding included:
 //!
@@ -11,9 +11,9 @@
 //! * `n . cone_axis >= cone_cos` for the exact unit normal `n` of every triangle with an area;
 //! * every triangle whose three corners are at different places has no altitude below `min_altitude`.
 //!
-//! Directions of face normals come from cross products in `f64`. Differences of `f32` coordinates are exact there but for
-//! rare cases, so a product's relative error is below 2^-50 |u||v|; where |u x v| is below 2^-30 |u||v| this may turn the direction by
-//! more than 2^-20, and the cone is given up; otherwise [`CONE_PADDING`] covers it.
+//! Directions of face normals come from cross products in `f64`. A difference of two `f32` coordinates is rounded once
+//! at most, so a cross product is off by less than 2^-50 |u||v|. Where |u x v| is below 2^-30 |u||v|, this may turn
+//! the direction by more than 2^-20, and the cone is given up; otherwise `CONE_PADDING` covers it.
 
 use super::Vec3s;
 use glam::DVec3;
@@ -22,8 +22,8 @@ use std::ops::Range;
 /// Most triangles of a cluster.
 pub const MAX_TRIANGLES: usize = 128;
 
-/// What the cosine of a cone is lowered by: an angle of at least 2e-6, more than the 2^-20 that a face normal may be off
-/// and the rounding of the axis to `f32`, whose length is not exactly 1.
+/// What the cosine of a cone is lowered by: an angle of at least 2e-6, more than the 2^-20 that a face normal may be
+/// off and the rounding of the axis to `f32`, whose length is not exactly 1.
 const CONE_PADDING: f64 = 2e-6;
 
 /// Consecutive triangles that lie close together, and bounds on them.
@@ -37,7 +37,8 @@ pub struct Cluster {
     pub radius: f32,
     /// Axis of a cone about the geometric normals of all triangles with an area; a unit vector up to rounding.
     pub cone_axis: [f32; 3],
-    /// Cosine of the cone's half-angle; -1, which means all directions, when there is no narrower cone or no triangle with an area.
+    /// Cosine of the cone's half-angle; -1, which means all directions, when there is no narrower cone or no triangle
+    /// with an area.
     pub cone_cos: f32,
     /// Lower bound of the altitudes of all triangles with three different corners; 0 if there are none.
     pub min_altitude: f32,
@@ -174,13 +175,12 @@ fn normal_cone(triangles: impl Iterator<Item = [DVec3; 3]> + Clone) -> ([f32; 3]
     let mut sum = DVec3::ZERO;
     for (cross, product) in crosses.clone() {
         let length = cross.length();
-        // Asked in this way, NaN gives up too.
-        if length == 0.0 {
-            continue;
-        } else if !(length > product * 2.0_f64.powi(-30)) {
+        if length > product * 2.0_f64.powi(-30) {
+            sum += cross / length;
+        } else if length != 0.0 {
+            // A needle whose normal is uncertain, or NaN.
             return everything;
         }
-        sum += cross / length;
     }
     let Some(axis) = sum.try_normalize() else {
         return everything;

@@ -9,13 +9,13 @@
 //!   y = 0 sideways to its outer point.
 //!
 //! Patches are `P(u, v)`, u across rows (along a profile or a tube) and v along a row. The normal is `P_u x P_v`.
-//! Where a whole row is one point (the pole of the lid, and of the bottom), `P_v` vanishes; near it
-//! `P_v = (u - u0) P_uv`, so that the limit of the normal from inside the patch is `± P_u x P_uv`. Triangles at a pole that have
-//! lost their area are kept, so that n x n quads on each patch give `2 n n` triangles: 896 on the 28 patches without
+//! Where a whole row is one point (the pole of the lid, and of the bottom), `P_v` vanishes; near it `P_v = (u - u0)
+//! P_uv`, so that the limit of the normal from inside the patch is `± P_u x P_uv`. Triangles at a pole that have lost
+//! their area are kept, so that n x n quads on each patch give `2 n n` triangles: 896 on the 28 patches without
 //! bottom at n = 4, as in the paper.
 //!
 //! Patches meet at common borders with common tangent planes nearly everywhere; border vertices closer than
-//! [`WELD_DISTANCE`] become one, with the mean of their normals, unless these are more than 60 degrees apart.
+//! `WELD_DISTANCE` become one, with the mean of their normals, unless these are more than 60 degrees apart.
 
 use crate::geometry::Mesh;
 use glam::DVec3;
