@@ -15,6 +15,7 @@
 
 use crate::simd::Simd;
 use fearless_simd::prelude::*;
+use std::f32::consts::{LN_2, LOG2_E};
 
 /// Powers below this are flushed to zero: with 255 codes and the slope of the sRGB curve they are far from visible.
 pub const FLUSH: f64 = 1.0 / (1_u32 << 24) as f64;
@@ -96,7 +97,7 @@ impl Power {
             .mul_add(f, splat(-0.360_693_28))
             .mul_add(f, splat(0.480_910_75))
             .mul_add(f, splat(-0.721_347_45))
-            .mul_add(f, splat(1.442_695));
+            .mul_add(f, splat(LOG2_E));
         let log2 = f.mul_add(q, k.to_float::<S::f32s>());
         exp2_lanes(simd, log2 * splat(self.exponent))
     }
@@ -115,7 +116,7 @@ fn exp2_lanes<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
         .mul_add(f, splat(0.009_666_368))
         .mul_add(f, splat(0.055_503_81))
         .mul_add(f, splat(0.240_223_5))
-        .mul_add(f, splat(0.693_147_2))
+        .mul_add(f, splat(LN_2))
         .mul_add(f, splat(1.0));
     (p.bitcast::<S::u32s>() + (rounded.bitcast::<S::u32s>() << 23)).bitcast()
 }

@@ -64,7 +64,7 @@ pub fn encode_codes_lanes<S: Simd>(simd: S, linear: S::f32s) -> S::f32s {
     for _ in 0..2 {
         let y2 = y * y;
         let residual = (x * splat(-0.25) * y2).mul_add(y2, splat(1.25));
-        y = y * residual;
+        y *= residual;
     }
     let near = x * (y * y * y);
     let t = near * (near * splat(-0.75)).mul_add(y, splat(1.75));
