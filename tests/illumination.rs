@@ -236,9 +236,9 @@ fn only_active_terms_are_added() {
             }
         }
         for (i, sum) in want.iter().enumerate() {
-            for c in 0..3 {
-                let want = sum[c] + material.ambient[c];
-                assert!((got.get(i)[c] - want).abs() < 1e-5 * want.max(1.0));
+            for ((got, sum), ambient) in got.get(i).iter().zip(sum).zip(material.ambient) {
+                let want = sum + ambient;
+                assert!((got - want).abs() < 1e-5 * want.max(1.0));
             }
         }
     }

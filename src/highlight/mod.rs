@@ -1,1 +1,15 @@
-//! highlight.
+//! Which triangles can hold a highlight, and which terms of the illumination equation vary on them.
+//!
+//! A **potentially highlighted triangle** (PHT) is one that passes the H1 and H2 tests of Cho, Neumann and Woo,
+//! *Improved Specular Highlights with Adaptive Shading*, section 2 ([`signs`]). They look for highlight *centres*; a lobe that
+//! reaches a triangle from outside, or a centre that the vertices do not notice, is missed. So there is a bound as well
+//! ([`bound`]), which misses nothing, and from it the set of terms that must be evaluated at every pixel ([`masks`]).
+
+pub mod bound;
+mod cone;
+pub mod masks;
+pub mod signs;
+
+pub use bound::{FactorBound, LightBound, TriangleBound};
+pub use masks::{TriangleLights, Verdict, light_masks, masks_of};
+pub use signs::{SignBits, compute_signs};

@@ -1,0 +1,325 @@
+//! What a light can do on a triangle: intervals of its diffuse and specular factor, and how far they are from interpolation.
+//!
+//! All cosines come from [`cone`](super::cone), as an interval (from cones, and from corner values) and a deviation from linear
+//! interpolation. On top of them:
+//!
+//! **Horizon.** Where `n.l` has no positive value, both terms are absent. Where it changes sign, the specular factor jumps, and
+//! only its interval `[0, hi]` holds.
+//!
+//! **Phong.** Reflecting about a fixed `n` keeps angles; reflecting one vector about `n` and about `n'` gives results at most
+//! `2 ang(n, n')` apart, as two half-turns make a rotation by twice the angle of their axes. Hence the angle of `r` and `v` is that of the cones'
+//! axes within `beta_l + beta_v + 2 alpha`. And `r.v = 2 (n.l)(n.v) - l.v` gives the deviation.
+//!
+//! **Blinn-Phong.** If unit vectors `l`, `v` are within chords `e_l`, `e_v` of the axes `L`, `V`, then `l + v` is within `e_l + e_v` of `L + V`,
+//! so its direction turns by at most `asin((e_l + e_v) / |L + V|)`; no bound where that is not below 1 (light nearly opposite to
+//! the viewer). And `n.h = (n.l + n.v) / sqrt(2 (1 + l.v))` gives the deviation.
+//!
+//! **Power.** `c^s` is monotonic in `c`. Its deviation from interpolation is at most `s c^(s-1)` times that of `c`, plus
+//! `s (s-1) c^(s-2) / 8` times the square of the corner values' range (the variance of a quantity is at most a quarter of its squared
+//! range), both at the greatest `c`; for `s >= 2`, where the clamped power has a continuous slope.
+//!
+//! **Two-sided** normals turn to the viewer: forwards or backwards where that is proved, else the hull of both.
+//!
+//! Powers come from the `libm` crate: decisions based on them must not depend on the machine.
+
+use super::cone::{Angle, Directions, PAD, Varying, greatest, least};
+use crate::illumination::power::FLUSH;
+use crate::illumination::reference::vector;
+use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial};
+use glam::DVec3;
+
+/// A factor of the illumination equation on a triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FactorBound {
+    /// It is nowhere less.
+    pub lo: f64,
+    /// It is nowhere more.
+    pub hi: f64,
+    /// It nowhere differs more from what is interpolated between the corners.
+    pub deviation: f64,
+}
+
+impl FactorBound {
+    /// All that is known of any factor.
+    const TRIVIAL: Self = Self {
+        lo: 0.0,
+        hi: 1.0,
+        deviation: 1.0,
+    };
+
+    /// Holds for a factor that obeys one of the two, at each point and corner.
+    fn hull(self, other: Self) -> Self {
+        let (lo, hi) = (self.lo.min(other.lo), self.hi.max(other.hi));
+        Self {
+            lo,
+            hi,
+            deviation: hi - lo,
+        }
+    }
+}
+
+/// Both factors of a light on a triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LightBound {
+    /// `max(0, n.l)`.
+    pub diffuse: FactorBound,
+    /// `S`; zero without a specular material.
+    pub specular: FactorBound,
+}
+
+impl LightBound {
+    fn hull(self, other: Self) -> Self {
+        Self {
+            diffuse: self.diffuse.hull(other.diffuse),
+            specular: self.specular.hull(other.specular),
+        }
+    }
+}
+
+/// A triangle made ready for bounding one light after the other.
+#[derive(Clone, Copy, Debug)]
+pub struct TriangleBound {
+    corners: [DVec3; 3],
+    /// Size of rounding errors of interpolated positions.
+    blur: f64,
+    facing: Facing,
+    to_viewer: Directions,
+    specular: bool,
+    model: ReflectionModel,
+    exponent: f64,
+}
+
+/// The normals that take part, each with its cosine to the viewer.
+#[derive(Clone, Copy, Debug)]
+enum Facing {
+    One(Directions, Varying),
+    Both([(Directions, Varying); 2]),
+}
+
+impl TriangleBound {
+    /// From world space corners and normals of any length.
+    #[must_use]
+    pub fn new(
+        positions: [[f32; 3]; 3],
+        normals: [[f32; 3]; 3],
+        eye: &Eye,
+        material: &ShadingMaterial,
+    ) -> Self {
+        let corners = positions.map(vector);
+        let size = greatest(corners.map(|p| p.abs().max_element()));
+        let blur = size * f64::from(f32::EPSILON);
+        let to_viewer = match *eye {
+            Eye::Point(eye) => Directions::new(corners.map(|p| vector(eye) - p), blur),
+            Eye::Direction(direction) => Directions::constant(vector(direction)),
+        };
+        let normal = Directions::new(normals.map(vector), 0.0);
+        let cosine = Varying::cosine(&normal, &to_viewer);
+        let back = || {
+            let reversed = normal.reversed();
+            (reversed, Varying::cosine(&reversed, &to_viewer))
+        };
+        let facing = if !material.two_sided || cosine.lo > 0.0 {
+            Facing::One(normal, cosine)
+        } else if cosine.hi < 0.0 {
+            let (normal, cosine) = back();
+            Facing::One(normal, cosine)
+        } else {
+            Facing::Both([(normal, cosine), back()])
+        };
+        Self {
+            corners,
+            blur,
+            facing,
+            to_viewer,
+            specular: material.is_specular(),
+            model: material.model,
+            exponent: f64::from(material.shininess.max(0.0)),
+        }
+    }
+
+    /// Bounds of a light's factors.
+    #[must_use]
+    pub fn light(&self, light: &ShadingLight) -> LightBound {
+        let at = vector(light.vector);
+        let to_light = if light.is_point {
+            let blur = self
+                .blur
+                .max(at.abs().max_element() * f64::from(f32::EPSILON));
+            Directions::new(self.corners.map(|p| at - p), blur)
+        } else {
+            Directions::constant(at)
+        };
+        match &self.facing {
+            Facing::One(n, n_v) => self.light_on_side(&to_light, n, n_v),
+            Facing::Both(sides) => {
+                let [front, back] = sides
+                    .each_ref()
+                    .map(|(n, n_v)| self.light_on_side(&to_light, n, n_v));
+                front.hull(back)
+            }
+        }
+    }
+
+    fn light_on_side(&self, l: &Directions, n: &Directions, n_v: &Varying) -> LightBound {
+        let n_l = Varying::cosine(n, l);
+        if n_l.hi <= 0.0 {
+            return LightBound::default();
+        }
+        LightBound {
+            diffuse: clamped(&n_l),
+            specular: if self.specular {
+                self.specular(l, n, n_v, &n_l)
+            } else {
+                FactorBound::default()
+            },
+        }
+    }
+
+    fn specular(
+        &self,
+        l: &Directions,
+        n: &Directions,
+        n_v: &Varying,
+        n_l: &Varying,
+    ) -> FactorBound {
+        let v = &self.to_viewer;
+        let l_v = Varying::cosine(l, v);
+        let base = match self.model {
+            ReflectionModel::Phong => phong_base(l, n, v, n_l, n_v, &l_v),
+            ReflectionModel::BlinnPhong => blinn_base(l, n, v, n_l, n_v, &l_v),
+        };
+        power(&base, n_l, self.exponent)
+    }
+}
+
+/// The positive part.
+fn clamped(x: &Varying) -> FactorBound {
+    let (lo, hi) = (x.lo.max(0.0), x.hi.clamp(0.0, 1.0));
+    // Interpolating positive parts differs from the positive part of the interpolation where corners differ in sign.
+    let kink = greatest(x.at).max(0.0).min((-least(x.at)).max(0.0));
+    FactorBound {
+        lo: lo.min(hi),
+        hi,
+        deviation: (x.deviation + kink).min(hi - lo).max(0.0),
+    }
+}
+
+/// `r.v`.
+fn phong_base(
+    l: &Directions,
+    n: &Directions,
+    v: &Directions,
+    n_l: &Varying,
+    n_v: &Varying,
+    l_v: &Varying,
+) -> Varying {
+    let reflected = n.axis * (2.0 * n.axis.dot(l.axis)) - l.axis;
+    let apart = Angle::from_cos(reflected.dot(v.axis));
+    let spread = l.spread.plus(v.spread).plus(n.spread).plus(n.spread);
+    Varying::new(
+        std::array::from_fn(|i| 2.0 * n_l.at[i] * n_v.at[i] - l_v.at[i]),
+        apart.plus(spread).cos,
+        apart.minus(spread).cos,
+        2.0 * n_l.product_deviation(n_v) + l_v.deviation + PAD,
+    )
+}
+
+/// `n.h`.
+fn blinn_base(
+    l: &Directions,
+    n: &Directions,
+    v: &Directions,
+    n_l: &Varying,
+    n_v: &Varying,
+    l_v: &Varying,
+) -> Varying {
+    let half = l.axis + v.axis;
+    // The chord of an angle is 2 sin(angle / 2).
+    let chord = |angle: Angle| (2.0 - 2.0 * angle.cos).max(0.0).sqrt();
+    let turn = (chord(l.spread) + chord(v.spread)) / half.length();
+    // False for NaN too: opposite axes.
+    let (lo, hi) = if turn < 1.0 {
+        let apart = Angle::from_cos(n.axis.dot(half.normalize_or_zero()));
+        let spread = Angle::from_sin(turn).plus(n.spread);
+        (apart.plus(spread).cos, apart.minus(spread).cos)
+    } else {
+        (-1.0, 1.0)
+    };
+    let u_lo = 1.0 + l_v.lo;
+    if u_lo < 0.01 {
+        // The corner values may be anything in the interval.
+        return Varying {
+            at: [lo, hi, hi],
+            lo,
+            hi,
+            deviation: hi - lo,
+        };
+    }
+    // psi(u) = (2 u)^(-1/2) of u = 1 + l.v, its slope and curvature greatest at the least u.
+    let root = 1.0 / (2.0 * u_lo).sqrt();
+    let cube = root * root * root;
+    let psi = Varying {
+        at: l_v.at.map(|c| 1.0 / (2.0 + 2.0 * c).sqrt()),
+        lo: 0.5,
+        hi: root,
+        deviation: cube * l_v.deviation
+            + 3.0 / 8.0 * cube * root * root * l_v.range() * l_v.range(),
+    };
+    let sum = Varying {
+        at: std::array::from_fn(|i| n_l.at[i] + n_v.at[i]),
+        lo: n_l.lo + n_v.lo,
+        hi: n_l.hi + n_v.hi,
+        deviation: n_l.deviation + n_v.deviation,
+    };
+    Varying::new(
+        std::array::from_fn(|i| sum.at[i] * psi.at[i]),
+        lo,
+        hi,
+        sum.product_deviation(&psi) + PAD,
+    )
+}
+
+/// The base to the exponent where it is positive and the light is in front.
+fn power(base: &Varying, n_l: &Varying, exponent: f64) -> FactorBound {
+    // c^s <= exp(-s (1 - c)), and what is below the flush is nothing in the picture.
+    let flushed = |c: f64| exponent * (1.0 - c) > -FLUSH.ln();
+    let c = base.hi.min(1.0);
+    if c <= 0.0 {
+        return FactorBound::default();
+    }
+    if flushed(c) {
+        return FactorBound {
+            lo: 0.0,
+            hi: FLUSH,
+            deviation: FLUSH,
+        };
+    }
+    let smooth = exponent >= 2.0 && n_l.lo > 0.0;
+    let (hi, mut deviation) = if smooth {
+        let curved = libm::pow(c, exponent - 2.0);
+        let slope = exponent * curved * c;
+        let curvature = exponent * (exponent - 1.0) * curved;
+        let range = base.range();
+        (
+            curved * c * c,
+            slope * base.deviation + curvature * range * range / 8.0,
+        )
+    } else {
+        (libm::pow(c, exponent), f64::INFINITY)
+    };
+    // A lower bound is only worth its cost where there is something to see.
+    let visible = hi > 1.0 / 4096.0 && n_l.lo > 0.0 && base.lo > 0.0;
+    let lo = if visible && !flushed(base.lo) {
+        libm::pow(base.lo.min(c), exponent)
+    } else {
+        0.0
+    };
+    deviation = deviation.min(hi - lo);
+    let bound = FactorBound { lo, hi, deviation };
+    // NaN from numbers that were not finite.
+    if deviation >= 0.0 {
+        bound
+    } else {
+        FactorBound::TRIVIAL
+    }
+}

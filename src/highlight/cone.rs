@@ -1,0 +1,276 @@
+//! Cosines between directions that vary over a triangle, bounded in two ways.
+//!
+//! Normals, and vectors to a light or viewer at a point, are all of one kind: the direction of `X = sum w_i X_i` with
+//! the barycentrics `w` of the point (for lights and viewers because `q - p` is linear in `p`). Write `X_i = p_i x_i`
+//! with unit `x_i`.
+//!
+//! **Cone.** A circular cone of half-angle below 90 degrees is convex; holding the three `X_i` it holds every `X`. No bounding
+//! sphere is needed. Angles between members of two cones differ from that of the axes by at most the sum of the half-angles.
+//! This is first order in the triangle's size.
+//!
+//! **Deviation.** How far can `f = x.y` be from the interpolation `lin = sum w_i x_i.y_i` of its corner values? Let
+//! `P = sum w_i p_i`, `Q` likewise for `y`, and `a_i = w_i p_i / P`, `b_i = w_i q_i / Q`, which are barycentrics too. Then
+//!
+//! ```text
+//! X.Y / (P Q) - lin = sum_ij a_i b_j x_i.(y_j - y_i) + sum_i (a_i - w_i) x_i.y_i
+//!                   = sum_{i<j} w_i w_j [ (p_i q_j x_i - p_j q_i x_j).(y_j - y_i) / (P Q)
+//!                                       + (p_i - p_j) (f_i - f_j) / P ]
+//! ```
+//!
+//! whose brackets are products of differences, hence of second order, and `sum_{i<j} w_i w_j <= 1/3`. The lengths obey
+//! `1 >= (|X| / P)^2 = 1 - 2 sum_{i<j} a_i a_j (1 - x_i.x_j) >= 1 - 2/3 max (1 - x_i.x_j)`. With `z_x >= P / |X|` from this,
+//! `f = X.Y / (P Q) * P/|X| * Q/|Y|` differs from `lin` by at most `max|f_i| (z_x z_y - 1) + z_x z_y e`, `e` being a third
+//! of the largest bracket. On fine meshes that is thousands of times smaller than the cones' interval.
+//!
+//! **Padding.** Inputs are `f32` taken as exact, and this arithmetic is `f64` (angles from cosines are good to 3e-8). The
+//! picture is interpolated in `f32`, though; cones are widened and deviations increased by [`PAD`], or more where the rounding of a
+//! position (of the size of the scene) turns the direction to something near. Vectors without direction, cones that are too wide and
+//! numbers that are not finite give the trivial interval.
+
+use glam::DVec3;
+
+/// Radians, or units of a cosine, that everything is padded with.
+pub(super) const PAD: f64 = 1e-6;
+
+/// An angle in `[0, pi]`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Angle {
+    pub(super) cos: f64,
+    sin: f64,
+}
+
+impl Angle {
+    pub(super) const STRAIGHT: Self = Self {
+        cos: -1.0,
+        sin: 0.0,
+    };
+
+    pub(super) fn from_cos(cos: f64) -> Self {
+        let cos = cos.clamp(-1.0, 1.0);
+        Self {
+            cos,
+            sin: ((1.0 - cos) * (1.0 + cos)).sqrt(),
+        }
+    }
+
+    /// From a sine in `[0, 1]`, at most a right angle.
+    pub(super) fn from_sin(sin: f64) -> Self {
+        let sin = sin.clamp(0.0, 1.0);
+        Self {
+            cos: ((1.0 - sin) * (1.0 + sin)).sqrt(),
+            sin,
+        }
+    }
+
+    /// The sum, or a straight angle where that is more.
+    pub(super) fn plus(self, other: Self) -> Self {
+        let sin = self.sin * other.cos + self.cos * other.sin;
+        // Both are in [0, pi], so the sine is negative exactly where the sum is beyond pi. Two straight angles give 0.
+        if sin < 0.0 || (self.cos < 0.0 && other.cos < 0.0) {
+            return Self::STRAIGHT;
+        }
+        Self {
+            cos: self.cos * other.cos - self.sin * other.sin,
+            sin,
+        }
+    }
+
+    /// The difference, or zero where that is less.
+    pub(super) fn minus(self, other: Self) -> Self {
+        let sin = self.sin * other.cos - self.cos * other.sin;
+        if sin < 0.0 || other.cos <= -1.0 {
+            return Self { cos: 1.0, sin: 0.0 };
+        }
+        Self {
+            cos: self.cos * other.cos + self.sin * other.sin,
+            sin,
+        }
+    }
+}
+
+/// A direction as it varies over a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Directions {
+    /// At the corners; zero where there is none.
+    unit: [DVec3; 3],
+    length: [f64; 3],
+    /// The cone.
+    pub(super) axis: DVec3,
+    pub(super) spread: Angle,
+    /// Bound of the sum of weighted lengths over the length of the weighted sum; infinite when unknown.
+    stretch: f64,
+    pad: f64,
+}
+
+impl Directions {
+    /// Of the vectors at the corners. `blur` is the size of rounding errors in them.
+    pub(super) fn new(vectors: [DVec3; 3], blur: f64) -> Self {
+        let length = vectors.map(DVec3::length);
+        let [p, q, r] = length;
+        let nearest = p.min(q).min(r);
+        if !(nearest > 0.0 && p.max(q).max(r).is_finite()) {
+            return Self::wide(vectors, length);
+        }
+        let unit = [vectors[0] / p, vectors[1] / q, vectors[2] / r];
+        let sum = unit[0] + unit[1] + unit[2];
+        let axis = sum.normalize_or_zero();
+        let cos = unit[0]
+            .dot(axis)
+            .min(unit[1].dot(axis))
+            .min(unit[2].dot(axis));
+        // Nearly 90 degrees is no better than wide; the comparison is false for a zero axis.
+        let pad = PAD + 2.0 * blur / nearest;
+        if !(cos > 0.01 && pad < 0.1) {
+            return Self::wide(vectors, length);
+        }
+        let farthest = pairs().map(|(i, j)| 1.0 - unit[i].dot(unit[j]));
+        let shrink = 1.0 - 2.0 / 3.0 * farthest[0].max(farthest[1]).max(farthest[2]);
+        Self {
+            unit,
+            length,
+            axis,
+            spread: Angle::from_cos(cos).plus(Angle::from_sin(pad)),
+            stretch: if shrink > 0.01 {
+                1.0 / shrink.min(1.0).sqrt()
+            } else {
+                f64::INFINITY
+            },
+            pad,
+        }
+    }
+
+    /// The same unit vector everywhere.
+    pub(super) fn constant(v: DVec3) -> Self {
+        Self::new([v; 3], 0.0)
+    }
+
+    fn wide(vectors: [DVec3; 3], length: [f64; 3]) -> Self {
+        Self {
+            unit: vectors.map(DVec3::normalize_or_zero),
+            length,
+            axis: DVec3::Z,
+            spread: Angle::STRAIGHT,
+            stretch: f64::INFINITY,
+            pad: PAD,
+        }
+    }
+
+    /// The opposite directions.
+    pub(super) fn reversed(&self) -> Self {
+        Self {
+            unit: self.unit.map(|v| -v),
+            axis: -self.axis,
+            ..*self
+        }
+    }
+}
+
+/// The three pairs of corners.
+fn pairs() -> [(usize, usize); 3] {
+    [(0, 1), (0, 2), (1, 2)]
+}
+
+/// A quantity as it varies over a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Varying {
+    /// At the corners.
+    pub(super) at: [f64; 3],
+    /// Lower bound.
+    pub(super) lo: f64,
+    /// Upper bound.
+    pub(super) hi: f64,
+    /// Bound of the difference from the linear interpolation of `at`.
+    pub(super) deviation: f64,
+}
+
+impl Varying {
+    /// Tightens a first interval by what `deviation` implies, and the deviation by the interval.
+    pub(super) fn new(at: [f64; 3], lo: f64, hi: f64, deviation: f64) -> Self {
+        let lo = lo.max(least(at) - deviation);
+        let hi = hi.min(greatest(at) + deviation);
+        Self {
+            at,
+            lo,
+            hi,
+            deviation: deviation.min(hi - lo),
+        }
+    }
+
+    /// The cosine of the angle between two directions.
+    pub(super) fn cosine(x: &Directions, y: &Directions) -> Self {
+        let apart = Angle::from_cos(x.axis.dot(y.axis));
+        let spread = x.spread.plus(y.spread);
+        let at = std::array::from_fn(|i| x.unit[i].dot(y.unit[i]));
+        Self::new(
+            at,
+            apart.plus(spread).cos,
+            apart.minus(spread).cos,
+            deviation(x, y, at),
+        )
+    }
+
+    /// Bound of the deviation of the product with another from the interpolation of its corner values: with both written as
+    /// linear part and rest, `sum w_i a_i b_i - lin(a) lin(b) = sum_{i<j} w_i w_j (a_i - a_j) (b_i - b_j)`.
+    pub(super) fn product_deviation(&self, other: &Self) -> f64 {
+        self.deviation * other.magnitude()
+            + other.deviation * self.magnitude()
+            + self.deviation * other.deviation
+            + self.range() * other.range() / 3.0
+    }
+
+    /// The largest absolute corner value.
+    fn magnitude(&self) -> f64 {
+        greatest(self.at.map(f64::abs))
+    }
+
+    /// How far apart the corner values are.
+    pub(super) fn range(&self) -> f64 {
+        greatest(self.at) - least(self.at)
+    }
+}
+
+fn deviation(x: &Directions, y: &Directions, f: [f64; 3]) -> f64 {
+    let stretch = x.stretch * y.stretch;
+    if !stretch.is_finite() {
+        return f64::INFINITY;
+    }
+    let (p, q) = (x.length, y.length);
+    let (p_least, q_least) = (least(p), least(q));
+    let brackets = pairs().map(|(i, j)| {
+        let turned = x.unit[i] * (p[i] * q[j]) - x.unit[j] * (p[j] * q[i]);
+        turned.dot(y.unit[j] - y.unit[i]).abs() / (p_least * q_least)
+            + ((p[i] - p[j]) * (f[i] - f[j])).abs() / p_least
+    });
+    greatest(f.map(f64::abs)) * (stretch - 1.0) + stretch * greatest(brackets) / 3.0 + x.pad + y.pad
+}
+
+pub(super) fn least([a, b, c]: [f64; 3]) -> f64 {
+    a.min(b).min(c)
+}
+
+pub(super) fn greatest([a, b, c]: [f64; 3]) -> f64 {
+    a.max(b).max(c)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn angles_add_and_subtract_within_their_range() {
+        let angle = |a: f64| Angle::from_cos(a.cos());
+        for i in 0..=40 {
+            for j in 0..=40 {
+                let (a, b) = (PI * f64::from(i) / 40.0, PI * f64::from(j) / 40.0);
+                let sum = angle(a).plus(angle(b)).cos;
+                let difference = angle(a).minus(angle(b)).cos;
+                assert!((sum - (a + b).min(PI).cos()).abs() < 1e-7, "{a} + {b}");
+                assert!(
+                    (difference - (a - b).max(0.0).cos()).abs() < 1e-7,
+                    "{a} - {b}"
+                );
+            }
+        }
+    }
+}

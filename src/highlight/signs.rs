@@ -1,0 +1,320 @@
+//! The paper's H1 and H2 tests by signs at the vertices (Cho, Neumann and Woo, section 2.3).
+//!
+//! A mirror-like highlight needs a normal that lies in the plane LVP of light, viewer and point (H1) and in the
+//! halfway plane, which is orthogonal to it and holds the halfway vector (H2). A vertex stores, for every light, on which side of
+//! both planes its normal is:
+//!
+//! * H1: the sign of `(L x V) . N`;
+//! * H2: whether `cos(L, N) > cos(V, N)`. With `b = L.N`, `a = V.N` that is `b |b| |V|^2 > a |a| |L|^2`: the paper's
+//!   comparison of squares, whose case distinction of signs is in `x |x|`, and without its divisions;
+//! * *back*: both `a` and `b` are negative, hence neither light nor viewer is on the side of the normal.
+//!
+//! No vector is normalized. A triangle passes for a light when both H1 and H2 differ among its vertices, unless all three are *back*
+//! (the paper leaves out a triangle whose vertex is; one with a corner beyond the horizon can still hold a highlight).
+//!
+//! **Zero** counts as the negative side. Where light and viewer are in the same direction (a headlight) both values are
+//! zero everywhere, both planes are undefined, and no triangle passes; the [bound](super::bound) still sees the highlight.
+//! Products and sums are rounded one by one and in the same order at every SIMD level, so the bits are the same on all machines,
+//! and parallel vectors give exact zeroes. Where products leave the range of `f32` (lengths beyond 1e9, or below
+//! 1e-10) a bit may be wrong; nothing relies on it but a classification.
+//!
+//! Normals of two-sided materials are turned towards the viewer first.
+
+use crate::illumination::{LightMask, MAX_LIGHTS};
+use crate::scene::{Eye, ShadingLight, World};
+use crate::simd::{Level, Simd, dispatch};
+use fearless_simd::prelude::*;
+
+/// Lights whose bits share a word.
+const WORD_LIGHTS: usize = 32;
+
+/// The sign bits of a scene's vertices, one word per 32 lights and plane.
+#[derive(Clone, Debug, Default)]
+pub struct SignBits {
+    vertices: usize,
+    /// One plane of bits after the other for each word of lights.
+    words: Vec<[Vec<u32>; 3]>,
+}
+
+/// Where in [`SignBits::words`] each test's bits are.
+const H1: usize = 0;
+const H2: usize = 1;
+const BACK: usize = 2;
+
+impl SignBits {
+    /// Makes room for a world; bits are undefined until computed. Allocates only when the world has grown.
+    pub fn resize(&mut self, world: &World) {
+        self.vertices = world.positions.len();
+        let lights = world.lights.len().min(MAX_LIGHTS);
+        self.words
+            .resize_with(lights.div_ceil(WORD_LIGHTS), Default::default);
+        for plane in self.words.iter_mut().flatten() {
+            plane.resize(self.vertices, 0);
+        }
+    }
+
+    /// Lights for which both tests differ among the three vertices: the triangle is a potentially highlighted one.
+    ///
+    /// # Panics
+    /// When a vertex is not one of the world's.
+    #[must_use]
+    pub fn pht_lights(&self, triangle: [u32; 3]) -> LightMask {
+        let mut mask = 0;
+        for (index, planes) in self.words.iter().enumerate() {
+            let [h1, h2, back] = [H1, H2, BACK].map(|plane| {
+                let [a, b, c] = triangle.map(|vertex| planes[plane][vertex as usize]);
+                (a & b & c, a | b | c)
+            });
+            let passes = (h1.1 & !h1.0) & (h2.1 & !h2.0) & !back.0;
+            mask |= u128::from(passes) << (index * WORD_LIGHTS);
+        }
+        LightMask(mask)
+    }
+}
+
+/// Computes the bits of vertices given by index.
+///
+/// # Panics
+/// When a vertex is not one of the world's, or `bits` was not [resized](SignBits::resize) for it.
+pub fn compute_signs(level: Level, world: &World, eye: Eye, vertices: &[u32], bits: &mut SignBits) {
+    dispatch!(level, simd => signs_of_list(simd, world, eye, vertices, bits));
+}
+
+#[inline(always)]
+fn signs_of_list<S: Simd>(simd: S, world: &World, eye: Eye, vertices: &[u32], bits: &mut SignBits) {
+    for group in vertices.chunks(S::f32s::LEN) {
+        let index = |lane: usize| *group.get(lane).unwrap_or(&group[0]) as usize;
+        let point = gather(simd, &world.positions, index);
+        let mut normal = gather(simd, &world.normals, index);
+        let to_viewer = match eye {
+            Eye::Point(eye) => towards(simd, eye, point),
+            Eye::Direction(direction) => direction.map(|c| S::f32s::splat(simd, c)),
+        };
+        let zero = S::f32s::splat(simd, 0.0);
+        let two_sided = S::f32s::from_fn(simd, |lane| {
+            let material = world.vertex_material[index(lane)];
+            f32::from(world.materials[usize::from(material)].two_sided)
+        });
+        let turned = dot::<S>(to_viewer, normal).simd_lt(zero) & two_sided.simd_gt(zero);
+        normal = normal.map(|c| turned.select(-c, c));
+
+        for (planes, lights) in bits.words.iter_mut().zip(world.lights.chunks(WORD_LIGHTS)) {
+            let words = signs_of_lights(simd, lights, point, normal, to_viewer);
+            for (plane, word) in planes.iter_mut().zip(words) {
+                for (lane, &vertex) in group.iter().enumerate() {
+                    plane[vertex as usize] = word[lane];
+                }
+            }
+        }
+    }
+}
+
+/// The three words of bits of up to 32 lights, the first light in the lowest bit.
+#[inline(always)]
+fn signs_of_lights<S: Simd>(
+    simd: S,
+    lights: &[ShadingLight],
+    point: [S::f32s; 3],
+    n: [S::f32s; 3],
+    v: [S::f32s; 3],
+) -> [S::u32s; 3] {
+    let zero = S::f32s::splat(simd, 0.0);
+    let none = S::u32s::splat(simd, 0);
+    let mut words = [none; 3];
+    let a = dot::<S>(v, n);
+    let (a_signed_square, v_square) = (a * a.abs(), dot::<S>(v, v));
+    for (index, light) in lights.iter().enumerate() {
+        let l = if light.is_point {
+            towards(simd, light.vector, point)
+        } else {
+            light.vector.map(|c| S::f32s::splat(simd, c))
+        };
+        let cross = [
+            l[1] * v[2] - l[2] * v[1],
+            l[2] * v[0] - l[0] * v[2],
+            l[0] * v[1] - l[1] * v[0],
+        ];
+        let b = dot::<S>(l, n);
+        let tests = [
+            dot::<S>(cross, n).simd_gt(zero),
+            (b * b.abs() * v_square).simd_gt(a_signed_square * dot::<S>(l, l)),
+            a.simd_lt(zero) & b.simd_lt(zero),
+        ];
+        let bit = S::u32s::splat(simd, 1 << index);
+        for (word, test) in words.iter_mut().zip(tests) {
+            *word |= test.select(bit, none);
+        }
+    }
+    words
+}
+
+/// Rounded term by term, so that no level differs.
+#[inline(always)]
+fn dot<S: Simd>(a: [S::f32s; 3], b: [S::f32s; 3]) -> S::f32s {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn towards<S: Simd>(simd: S, target: [f32; 3], from: [S::f32s; 3]) -> [S::f32s; 3] {
+    std::array::from_fn(|i| S::f32s::splat(simd, target[i]) - from[i])
+}
+
+#[inline(always)]
+fn gather<S: Simd>(
+    simd: S,
+    v: &crate::geometry::Vec3s,
+    index: impl Fn(usize) -> usize,
+) -> [S::f32s; 3] {
+    [&v.x, &v.y, &v.z].map(|c| S::f32s::from_fn(simd, |lane| c[index(lane)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::illumination::reference::{towards_light, towards_viewer, vector};
+    use crate::scene::{ReflectionModel, ShadingMaterial};
+    use crate::simd::SimdLevel;
+    use glam::DVec3;
+
+    /// Section 2.3 in double precision, with normalized vectors and cosines: `[h1, h2]` as signed values, and *back*.
+    fn by_angles(
+        point: DVec3,
+        mut n: DVec3,
+        eye: &Eye,
+        two_sided: bool,
+        light: &ShadingLight,
+    ) -> ([f64; 2], bool) {
+        let (l, v) = (towards_light(point, light), towards_viewer(point, eye));
+        if two_sided && n.dot(v) < 0.0 {
+            n = -n;
+        }
+        let n = n.normalize_or_zero();
+        let (cos_phi, cos_theta) = (l.dot(n), v.dot(n));
+        (
+            [l.cross(v).dot(n), cos_phi - cos_theta],
+            cos_phi < 0.0 && cos_theta < 0.0,
+        )
+    }
+
+    fn world(lights: usize, two_sided: bool) -> World {
+        let mut state = 7_u64;
+        let mut next = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 40) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let mut world = World {
+            materials: vec![ShadingMaterial {
+                ambient: [0.0; 3],
+                diffuse: [1.0; 3],
+                specular: [1.0; 3],
+                shininess: 10.0,
+                model: ReflectionModel::Phong,
+                two_sided,
+            }],
+            ..World::default()
+        };
+        for _ in 0..301 {
+            world.positions.push([next(), next(), next()]);
+            world.normals.push([next(), next(), next()]);
+            world.vertex_material.push(0);
+        }
+        for index in 0..lights {
+            world.lights.push(ShadingLight {
+                vector: [3.0 * next(), 3.0 * next(), 3.0 * next()],
+                is_point: index % 3 > 0,
+                radiance: [1.0; 3],
+            });
+        }
+        world
+    }
+
+    #[test]
+    fn bits_are_those_of_the_angles_at_every_level() {
+        for (lights, two_sided) in [(1, false), (5, true), (33, false), (128, false)] {
+            let world = world(lights, two_sided);
+            let list: Vec<u32> = (0..301).filter(|v| v % 5 != 1).collect();
+            for eye in [
+                Eye::Point([0.5, -2.0, 1.0]),
+                Eye::Direction([0.0, 0.6, 0.8]),
+            ] {
+                for level in SimdLevel::available() {
+                    let mut bits = SignBits::default();
+                    bits.resize(&world);
+                    compute_signs(
+                        level.token().expect("available"),
+                        &world,
+                        eye,
+                        &list,
+                        &mut bits,
+                    );
+                    for &v in &list {
+                        for (index, light) in world.lights.iter().enumerate() {
+                            let point = vector(world.positions.get(v as usize));
+                            let normal = vector(world.normals.get(v as usize));
+                            let (values, back) = by_angles(point, normal, &eye, two_sided, light);
+                            let bit = |plane: usize| {
+                                bits.words[index / 32][plane][v as usize] >> (index % 32) & 1 == 1
+                            };
+                            for plane in [H1, H2] {
+                                if values[plane].abs() > 1e-5 {
+                                    assert_eq!(
+                                        bit(plane),
+                                        values[plane] > 0.0,
+                                        "{level} {v} {index}"
+                                    );
+                                }
+                            }
+                            assert_eq!(bit(BACK), back, "{level} {v} {index}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Fig. 7 of the paper: a flat triangle around the point where light reflects towards the viewer passes.
+    #[test]
+    fn a_triangle_around_a_mirror_point_passes_and_one_far_off_does_not() {
+        let mut world = world(1, false);
+        world.positions.clear();
+        world.normals.clear();
+        for shift in [0.0, 5.0] {
+            for corner in [[-1.0, -0.9, 0.0], [1.2, -0.8, 0.0], [0.1, 1.1, 0.0]] {
+                world
+                    .positions
+                    .push([corner[0] + shift, corner[1] + shift, 0.0]);
+                world.normals.push([0.0, 0.0, 1.0]);
+            }
+        }
+        world.vertex_material = vec![0; 6];
+        world.lights[0] = ShadingLight {
+            vector: [-2.0, 0.1, 2.0],
+            is_point: true,
+            radiance: [1.0; 3],
+        };
+        let mut bits = SignBits::default();
+        let level = SimdLevel::detect().token().expect("detected");
+        bits.resize(&world);
+        compute_signs(
+            level,
+            &world,
+            Eye::Point([2.0, -0.1, 2.0]),
+            &[0, 1, 2, 3, 4, 5],
+            &mut bits,
+        );
+        assert!(bits.pht_lights([0, 1, 2]).contains(0));
+        assert!(bits.pht_lights([3, 4, 5]).is_empty());
+        // Seen and lit from below nothing is potentially highlighted.
+        world.lights[0].vector[2] = -2.0;
+        compute_signs(
+            level,
+            &world,
+            Eye::Point([2.0, -0.1, -2.0]),
+            &[0, 1, 2],
+            &mut bits,
+        );
+        assert!(bits.pht_lights([0, 1, 2]).is_empty());
+    }
+}
