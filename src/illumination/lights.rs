@@ -1,7 +1,6 @@
 //! Sets of lights.
 
-/// Most lights a scene may have: a set of lights is one 128-bit word.
-pub const MAX_LIGHTS: usize = 128;
+pub use crate::scene::limits::MAX_LIGHTS;
 
 /// A set of lights, one bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

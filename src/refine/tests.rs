@@ -192,8 +192,14 @@ fn refined_vertices_lie_where_their_barycentrics_say() {
                     super::forest::blend(weights, root.map(|v| array.get(v as usize)))
                 };
                 let pairs = [
-                    (interpolate(&world.positions), forest.vertices.position(&world, vertex)),
-                    (interpolate(&world.normals), forest.vertices.normal(&world, vertex)),
+                    (
+                        interpolate(&world.positions),
+                        forest.vertices.position(&world, vertex),
+                    ),
+                    (
+                        interpolate(&world.normals),
+                        forest.vertices.normal(&world, vertex),
+                    ),
                 ];
                 for (expected, got) in pairs {
                     for k in 0..3 {

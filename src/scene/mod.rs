@@ -1,19 +1,69 @@
 //! What is rendered, validated: camera, lights, materials, objects, and the world made of them.
+//!
+//! A [`Scene`] is read from a file in RON (Rusty Object Notation). Everything has a default but the objects, so this is
+//! a whole scene file:
+//!
+//! ```
+//! let scene = specula::scene::Scene::parse("(objects: [(shape: Teapot())])", "example.ron")?;
+//! assert_eq!(scene.objects.len(), 1);
+//! # Ok::<(), specula::scene::SceneError>(())
+//! ```
+//!
+//! and this is one that says more; `scenes/README.md` describes every field:
+//!
+//! ```
+//! # let text = r##"
+//! (
+//!     camera: Perspective(position: (0, -8, 4), target: (0, 0, 1), fov_degrees: 35),
+//!     background: "#101418",
+//!     ambient: 0.1,
+//!     lights: [
+//!         Point(position: (-5, -6, 7), color: "#fff4e0", intensity: 0.9),
+//!         Directional(direction: (-1, 1, -2), intensity: 0.3),
+//!     ],
+//!     materials: {
+//!         "copper": (diffuse: (0.5, 0.2, 0.1), specular: (0.8, 0.6, 0.5), shininess: 60),
+//!     },
+//!     objects: [
+//!         (shape: Teapot(tessellation: 8), material: "copper", rotate_degrees: (0, 0, 30)),
+//!         (shape: Plane(width: 20, depth: 20, columns: 8, rows: 8)),
+//!     ],
+//! )
+//! # "##;
+//! # assert_eq!(specula::scene::Scene::parse(text, "example.ron")?.lights.len(), 2);
+//! # Ok::<(), specula::scene::SceneError>(())
+//! ```
 
+mod defaults;
+mod error;
+pub mod limits;
+mod read;
+mod shape;
+mod source;
+mod syntax;
 pub mod view;
 pub mod world;
 
+pub use error::SceneError;
 pub use view::{Eye, View};
 pub use world::{ReflectionModel, ShadingLight, ShadingMaterial, World};
 
 use crate::geometry::Mesh;
+use crate::math::Bounds;
 use glam::{DMat4, DVec3};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A linear RGB colour or coefficient; 1 is the display's white.
 pub type Rgb = [f64; 3];
 
-/// A validated scene in author space.
+/// A scene in author space: validated when it comes from a file.
+///
+/// Whoever changes a field calls [`touch`](Self::touch) afterwards, so that engines notice. A scene put together by
+/// hand should keep to the [`limits`], every object's material index below the number of materials.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// From where it is seen.
@@ -28,6 +78,105 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Meshes in place.
     pub objects: Vec<Object>,
+    id: u64,
+}
+
+impl Scene {
+    /// Reads a scene file.
+    ///
+    /// # Errors
+    /// When the file cannot be read ([`SceneError::is_io`]), or does not hold a valid scene.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        let bytes = read_bytes(path).map_err(|source| SceneError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        if bytes.len() as u64 > limits::MAX_FILE_BYTES {
+            return Err(SceneError::TooLarge {
+                path: path.to_owned(),
+            });
+        }
+        let file_name = path.to_string_lossy();
+        match std::str::from_utf8(&bytes) {
+            Ok(text) => Self::parse(text, &file_name),
+            Err(error) => Err(not_utf8(&bytes[..error.valid_up_to()], &file_name)),
+        }
+    }
+
+    /// Reads a scene from the text of a scene file. `file_name` is what messages call it.
+    ///
+    /// # Errors
+    /// When the text is not a valid scene.
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, SceneError> {
+        read::scene(&source::Source {
+            text: text.strip_prefix('\u{feff}').unwrap_or(text),
+            file: file_name,
+        })
+    }
+
+    /// A scene of objects, with the camera and lights that a scene file without them gets.
+    #[must_use]
+    pub fn new(materials: Vec<Material>, objects: Vec<Object>) -> Self {
+        let extent = Extent::of(&objects);
+        Self {
+            camera: Camera::fitted(&extent),
+            background: defaults::BACKGROUND,
+            ambient: defaults::AMBIENT,
+            lights: defaults::lights(&extent),
+            materials,
+            objects,
+            id: fresh_id(),
+        }
+    }
+
+    /// Identity of this state of the scene: two scenes with the same id have the same contents, provided that
+    /// [`touch`](Self::touch) was called after every change. A clone keeps the id until it is touched.
+    #[must_use]
+    pub fn id(&self) -> u64 {
+        self.id
+    }
+
+    /// Tells that the scene has changed: gives it a new [`id`](Self::id).
+    pub fn touch(&mut self) {
+        self.id = fresh_id();
+    }
+
+    /// Number of triangles of all objects.
+    #[must_use]
+    pub fn triangle_count(&self) -> usize {
+        self.objects.iter().map(|o| o.mesh.triangles.len()).sum()
+    }
+}
+
+/// An id that no scene of this process has had.
+fn fresh_id() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// The file's contents, cut off one byte beyond the limit.
+fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    let file = File::open(path)?;
+    if file.metadata()?.is_dir() {
+        // Not every system refuses to read from a directory with a telling error.
+        return Err(std::io::ErrorKind::IsADirectory.into());
+    }
+    let mut bytes = Vec::new();
+    file.take(limits::MAX_FILE_BYTES + 1)
+        .read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The error for a file that is not text, `valid` being what can be read before the fault.
+fn not_utf8(valid: &[u8], file_name: &str) -> SceneError {
+    let (line, column) = source::line_and_column(&String::from_utf8_lossy(valid));
+    SceneError::Invalid {
+        file: file_name.to_owned(),
+        line,
+        column,
+        message: "this is not UTF-8 text".to_owned(),
+    }
 }
 
 /// A camera in author space.
@@ -112,4 +261,57 @@ pub struct Object {
     pub material: usize,
     /// Affine transform from the mesh's space to author space.
     pub author_from_mesh: DMat4,
+}
+
+/// Where objects are in author space: a box that holds them.
+///
+/// It is found relative to the first object, so that a small scene far from the origin loses no digits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Middle of the box.
+    pub center: DVec3,
+    /// From the middle to the corner with the largest coordinates; zero without vertices.
+    pub half_size: DVec3,
+}
+
+impl Extent {
+    /// The extent of `objects`.
+    #[must_use]
+    pub fn of(objects: &[Object]) -> Self {
+        let reference = objects
+            .first()
+            .map_or(DVec3::ZERO, |o| o.author_from_mesh.w_axis.truncate());
+        let mut bounds = Bounds::EMPTY;
+        for object in objects {
+            let place = object.author_from_mesh;
+            let offset = place.w_axis.truncate() - reference;
+            for &p in &object.mesh.positions {
+                bounds.grow(place.transform_vector3(p) + offset);
+            }
+        }
+        Self {
+            center: reference + bounds.center(),
+            half_size: if bounds.is_empty() {
+                DVec3::ZERO
+            } else {
+                bounds.max * 0.5 - bounds.min * 0.5
+            },
+        }
+    }
+
+    /// Radius of the sphere about the middle that holds the box.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.half_size.length()
+    }
+}
+
+/// `v` scaled to length 1 however long it is; `None` when it is zero or not finite.
+pub(crate) fn unit(v: DVec3) -> Option<DVec3> {
+    let largest = v.abs().max_element();
+    if !(largest > 0.0 && v.is_finite()) {
+        return None;
+    }
+    // Squares of the scaled components neither overflow nor vanish all; the division is by at least 1 ulp above zero.
+    Some((v / largest).normalize())
 }

@@ -1,0 +1,185 @@
+//! `objects:` of a scene file.
+
+use super::super::Object;
+use super::super::error::SceneError;
+use super::super::limits::{MAX_SEGMENTS, MAX_TRIANGLES};
+use super::super::shape::Shape;
+use super::super::source::{Raw, Source};
+use super::super::syntax::{ObjectEntry, ShapeEntry};
+use super::Materials;
+use crate::geometry::Mesh;
+use glam::{DMat3, DMat4, DVec3};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Reads the objects, of which there is at least one.
+pub(super) fn objects(
+    source: &Source<'_>,
+    raw: Option<Raw<'_>>,
+    materials: &mut Materials,
+) -> Result<Vec<Object>, SceneError> {
+    let entries: Vec<Raw<'_>> = raw.map_or_else(|| Ok(Vec::new()), |raw| source.parse(raw))?;
+    if entries.is_empty() {
+        return Err(source.error(
+            raw.unwrap_or(source.whole()),
+            "the scene has no objects; `objects` must name at least one",
+        ));
+    }
+    let mut planned = Vec::with_capacity(entries.len());
+    let mut triangles = 0_u64;
+    for (index, &raw) in entries.iter().enumerate() {
+        let entry: ObjectEntry<'_> = source.parse(raw)?;
+        let at = format!("objects[{index}]");
+        let (shape, size) = shape(source, entry.shape, &at)?;
+        triangles += shape.triangles();
+        if triangles > MAX_TRIANGLES {
+            return Err(source.field(entry.shape, format_args!("{at}.shape")).fail(
+                format_args!(
+                    "brings the scene to {triangles} triangles; at most {MAX_TRIANGLES} are possible"
+                ),
+            ));
+        }
+        let material = materials.find(source, entry.material, format_args!("{at}.material"))?;
+        planned.push((shape, material, place(source, &entry, size, &at)?));
+    }
+    // Only now, with everything checked, is memory taken.
+    let mut meshes: HashMap<[u64; 4], Arc<Mesh>> = HashMap::new();
+    Ok(planned
+        .into_iter()
+        .map(|(shape, material, author_from_mesh)| Object {
+            mesh: meshes
+                .entry(shape.key())
+                .or_insert_with(|| Arc::new(shape.mesh()))
+                .clone(),
+            material,
+            author_from_mesh,
+        })
+        .collect())
+}
+
+/// A shape, and the factors by which its mesh must be scaled to have the size asked for.
+fn shape<'a>(source: &Source<'a>, raw: Raw<'a>, at: &str) -> Result<(Shape, DVec3), SceneError> {
+    let field = |raw, name: &str| source.field(raw, format_args!("{at}.shape.{name}"));
+    let count = |raw: Option<Raw<'a>>, name, min, default| {
+        raw.map_or(Ok(default), |raw| field(raw, name).whole(min, MAX_SEGMENTS))
+    };
+    let length = |raw: Option<Raw<'a>>, name, default| {
+        raw.map_or(Ok(default), |raw| field(raw, name).length())
+    };
+    Ok(match source.parse(raw)? {
+        ShapeEntry::Teapot {
+            tessellation,
+            bottom,
+        } => (
+            Shape::Teapot {
+                tessellation: count(tessellation, "tessellation", 1, 8)?,
+                bottom: bottom.map_or(Ok(false), |raw| field(raw, "bottom").flag())?,
+            },
+            DVec3::ONE,
+        ),
+        ShapeEntry::Sphere {
+            radius,
+            slices,
+            stacks,
+        } => (
+            Shape::Sphere {
+                slices: count(slices, "slices", 3, 32)?,
+                stacks: count(stacks, "stacks", 2, 16)?,
+            },
+            DVec3::splat(length(radius, "radius", 1.0)?),
+        ),
+        ShapeEntry::Torus {
+            major_radius,
+            minor_radius,
+            major_segments,
+            minor_segments,
+        } => {
+            let major = length(major_radius, "major_radius", 1.0)?;
+            let minor = length(minor_radius, "minor_radius", major * 0.4)?;
+            if minor >= major {
+                return Err(
+                    field(minor_radius.unwrap_or(raw), "minor_radius").fail(format_args!(
+                        "is {minor} and must be less than `major_radius`, which is {major}"
+                    )),
+                );
+            }
+            (
+                Shape::Torus {
+                    minor_radius: minor / major,
+                    major_segments: count(major_segments, "major_segments", 3, 48)?,
+                    minor_segments: count(minor_segments, "minor_segments", 3, 24)?,
+                },
+                DVec3::splat(major),
+            )
+        }
+        ShapeEntry::Plane {
+            width,
+            depth,
+            columns,
+            rows,
+        } => (
+            Shape::Plane {
+                columns: count(columns, "columns", 1, 1)?,
+                rows: count(rows, "rows", 1, 1)?,
+            },
+            DVec3::new(
+                length(width, "width", 1.0)?,
+                length(depth, "depth", 1.0)?,
+                1.0,
+            ),
+        ),
+        ShapeEntry::Box { size } => (
+            Shape::Cube,
+            size.map_or(Ok(DVec3::ONE), |raw| field(raw, "size").lengths())?,
+        ),
+    })
+}
+
+/// Where an object is: scaled, turned about x, then y, then z, and moved.
+fn place(
+    source: &Source<'_>,
+    entry: &ObjectEntry<'_>,
+    size: DVec3,
+    at: &str,
+) -> Result<DMat4, SceneError> {
+    let field = |raw, name: &str| source.field(raw, format_args!("{at}.{name}"));
+    let position = entry
+        .position
+        .map_or(Ok(DVec3::ZERO), |raw| field(raw, "position").vector())?;
+    let angles = entry
+        .rotate_degrees
+        .map_or(Ok(DVec3::ZERO), |raw| field(raw, "rotate_degrees").vector())?;
+    let scale = entry
+        .scale
+        .map_or(Ok(DVec3::ONE), |raw| field(raw, "scale").scale())?;
+    let linear = rotation(angles) * DMat3::from_diagonal(scale * size);
+    Ok(DMat4::from_cols(
+        linear.x_axis.extend(0.0),
+        linear.y_axis.extend(0.0),
+        linear.z_axis.extend(0.0),
+        position.extend(1.0),
+    ))
+}
+
+/// The rotation about the x axis, then the y axis, then the z axis, by angles in degrees.
+fn rotation(degrees: DVec3) -> DMat3 {
+    let [(sx, cx), (sy, cy), (sz, cz)] = degrees.to_array().map(sin_cos_degrees);
+    let x = DMat3::from_cols(DVec3::X, DVec3::new(0.0, cx, sx), DVec3::new(0.0, -sx, cx));
+    let y = DMat3::from_cols(DVec3::new(cy, 0.0, -sy), DVec3::Y, DVec3::new(sy, 0.0, cy));
+    let z = DMat3::from_cols(DVec3::new(cz, sz, 0.0), DVec3::new(-sz, cz, 0.0), DVec3::Z);
+    z * y * x
+}
+
+/// Sine and cosine of an angle in degrees, exact at right angles, the same on every machine.
+fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+    let turned = libm::fmod(degrees, 360.0);
+    let quarter = libm::round(turned / 90.0);
+    let rest = (turned - quarter * 90.0).to_radians();
+    let (s, c) = (libm::sin(rest), libm::cos(rest));
+    match (quarter as i32).rem_euclid(4) {
+        0 => (s, c),
+        1 => (c, -s),
+        2 => (-s, -c),
+        _ => (-c, s),
+    }
+}
