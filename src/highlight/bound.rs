@@ -20,9 +20,10 @@
 //!
 //! **Two-sided** normals turn to the viewer: forwards or backwards where that is proved, else the hull of both.
 //!
-//! Powers come from the `libm` crate: decisions based on them must not depend on the machine.
+//! Nothing here depends on the machine: decisions are based on it.
 
 use super::cone::{Angle, Directions, PAD, Varying, greatest, least};
+use super::power::{power_above, power_below};
 use crate::illumination::power::FLUSH;
 use crate::illumination::reference::vector;
 use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial};
@@ -105,14 +106,14 @@ impl TriangleBound {
         eye: &Eye,
         material: &ShadingMaterial,
     ) -> Self {
-        let corners = positions.map(vector);
+        let corners = triple(positions);
         let size = greatest(corners.map(|p| p.abs().max_element()));
         let blur = size * f64::from(f32::EPSILON);
         let to_viewer = match *eye {
-            Eye::Point(eye) => Directions::new(corners.map(|p| vector(eye) - p), blur),
+            Eye::Point(eye) => Directions::new(from_corners(vector(eye), &corners), blur),
             Eye::Direction(direction) => Directions::constant(vector(direction)),
         };
-        let normal = Directions::new(normals.map(vector), 0.0);
+        let normal = Directions::new(triple(normals), 0.0);
         let cosine = Varying::cosine(&normal, &to_viewer);
         let back = || {
             let reversed = normal.reversed();
@@ -145,7 +146,7 @@ impl TriangleBound {
             let blur = self
                 .blur
                 .max(at.abs().max_element() * f64::from(f32::EPSILON));
-            Directions::new(self.corners.map(|p| at - p), blur)
+            Directions::new(from_corners(at, &self.corners), blur)
         } else {
             Directions::constant(at)
         };
@@ -190,6 +191,16 @@ impl TriangleBound {
         };
         power(&base, n_l, self.exponent)
     }
+}
+
+/// In double precision. (Written out, here and elsewhere: `array::map` is not always inlined.)
+fn triple([a, b, c]: [[f32; 3]; 3]) -> [DVec3; 3] {
+    [vector(a), vector(b), vector(c)]
+}
+
+/// Vectors from the corners to a point.
+fn from_corners(to: DVec3, [a, b, c]: &[DVec3; 3]) -> [DVec3; 3] {
+    [to - a, to - b, to - c]
 }
 
 /// The positive part.
@@ -258,8 +269,9 @@ fn blinn_base(
     // psi(u) = (2 u)^(-1/2) of u = 1 + l.v, its slope and curvature greatest at the least u.
     let root = 1.0 / (2.0 * u_lo).sqrt();
     let cube = root * root * root;
+    let psi = |c: f64| 1.0 / (2.0 + 2.0 * c).sqrt();
     let psi = Varying {
-        at: l_v.at.map(|c| 1.0 / (2.0 + 2.0 * c).sqrt()),
+        at: [psi(l_v.at[0]), psi(l_v.at[1]), psi(l_v.at[2])],
         lo: 0.5,
         hi: root,
         deviation: cube * l_v.deviation
@@ -279,10 +291,13 @@ fn blinn_base(
     )
 }
 
+/// `-ln(FLUSH)`.
+const FLUSH_DEPTH: f64 = 24.0 * std::f64::consts::LN_2;
+
 /// The base to the exponent where it is positive and the light is in front.
 fn power(base: &Varying, n_l: &Varying, exponent: f64) -> FactorBound {
     // c^s <= exp(-s (1 - c)), and what is below the flush is nothing in the picture.
-    let flushed = |c: f64| exponent * (1.0 - c) > -FLUSH.ln();
+    let flushed = |c: f64| exponent * (1.0 - c) > FLUSH_DEPTH;
     let c = base.hi.min(1.0);
     if c <= 0.0 {
         return FactorBound::default();
@@ -296,21 +311,22 @@ fn power(base: &Varying, n_l: &Varying, exponent: f64) -> FactorBound {
     }
     let smooth = exponent >= 2.0 && n_l.lo > 0.0;
     let (hi, mut deviation) = if smooth {
-        let curved = libm::pow(c, exponent - 2.0);
+        let curved = power_above(c, exponent - 2.0);
         let slope = exponent * curved * c;
         let curvature = exponent * (exponent - 1.0) * curved;
         let range = base.range();
         (
             curved * c * c,
-            slope * base.deviation + curvature * range * range / 8.0,
+            slope * base.deviation + curvature * range * range * 0.125,
         )
     } else {
-        (libm::pow(c, exponent), f64::INFINITY)
+        (power_above(c, exponent), f64::INFINITY)
     };
+    let hi = hi.min(1.0);
     // A lower bound is only worth its cost where there is something to see.
     let visible = hi > 1.0 / 4096.0 && n_l.lo > 0.0 && base.lo > 0.0;
     let lo = if visible && !flushed(base.lo) {
-        libm::pow(base.lo.min(c), exponent)
+        power_below(base.lo.min(c), exponent)
     } else {
         0.0
     };

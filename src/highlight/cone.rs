@@ -45,6 +45,7 @@ impl Angle {
         sin: 0.0,
     };
 
+    #[inline]
     pub(super) fn from_cos(cos: f64) -> Self {
         let cos = cos.clamp(-1.0, 1.0);
         Self {
@@ -54,6 +55,7 @@ impl Angle {
     }
 
     /// From a sine in `[0, 1]`, at most a right angle.
+    #[inline]
     pub(super) fn from_sin(sin: f64) -> Self {
         let sin = sin.clamp(0.0, 1.0);
         Self {
@@ -62,7 +64,17 @@ impl Angle {
         }
     }
 
+    /// An angle below 0.01; the error of its cosine is below 1e-9.
+    #[inline]
+    fn small(angle: f64) -> Self {
+        Self {
+            cos: 1.0 - 0.5 * angle * angle,
+            sin: angle,
+        }
+    }
+
     /// The sum, or a straight angle where that is more.
+    #[inline]
     pub(super) fn plus(self, other: Self) -> Self {
         let sin = self.sin * other.cos + self.cos * other.sin;
         // Both are in [0, pi], so the sine is negative exactly where the sum is beyond pi. Two straight angles give 0.
@@ -76,6 +88,7 @@ impl Angle {
     }
 
     /// The difference, or zero where that is less.
+    #[inline]
     pub(super) fn minus(self, other: Self) -> Self {
         let sin = self.sin * other.cos - self.cos * other.sin;
         if sin < 0.0 || other.cos <= -1.0 {
@@ -94,6 +107,8 @@ pub(super) struct Directions {
     /// At the corners; zero where there is none.
     unit: [DVec3; 3],
     length: [f64; 3],
+    /// One over the least length.
+    per_length: f64,
     /// The cone.
     pub(super) axis: DVec3,
     pub(super) spread: Angle,
@@ -105,33 +120,39 @@ pub(super) struct Directions {
 impl Directions {
     /// Of the vectors at the corners. `blur` is the size of rounding errors in them.
     pub(super) fn new(vectors: [DVec3; 3], blur: f64) -> Self {
-        let length = vectors.map(DVec3::length);
-        let [p, q, r] = length;
-        let nearest = p.min(q).min(r);
-        if !(nearest > 0.0 && p.max(q).max(r).is_finite()) {
+        let [a, b, c] = vectors;
+        let length = [a.length(), b.length(), c.length()];
+        let inverse = [1.0 / length[0], 1.0 / length[1], 1.0 / length[2]];
+        let per_length = greatest(inverse);
+        if !(least(length) > 0.0 && per_length.is_finite() && greatest(length).is_finite()) {
             return Self::wide(vectors, length);
         }
-        let unit = [vectors[0] / p, vectors[1] / q, vectors[2] / r];
+        let unit = [a * inverse[0], b * inverse[1], c * inverse[2]];
         let sum = unit[0] + unit[1] + unit[2];
-        let axis = sum.normalize_or_zero();
-        let cos = unit[0]
-            .dot(axis)
-            .min(unit[1].dot(axis))
-            .min(unit[2].dot(axis));
-        // Nearly 90 degrees is no better than wide; the comparison is false for a zero axis.
-        let pad = PAD + 2.0 * blur / nearest;
-        if !(cos > 0.01 && pad < 0.1) {
+        let axis = sum * (1.0 / sum.length());
+        let cos = least([unit[0].dot(axis), unit[1].dot(axis), unit[2].dot(axis)]);
+        // Nearly 90 degrees is no better than wide; the comparison is false for an axis that is not a number.
+        let pad = PAD + 2.0 * blur * per_length;
+        if !(cos > 0.01 && pad < 0.01) {
             return Self::wide(vectors, length);
         }
-        let farthest = pairs().map(|(i, j)| 1.0 - unit[i].dot(unit[j]));
-        let shrink = 1.0 - 2.0 / 3.0 * farthest[0].max(farthest[1]).max(farthest[2]);
+        let farthest = 1.0
+            - least([
+                unit[0].dot(unit[1]),
+                unit[0].dot(unit[2]),
+                unit[1].dot(unit[2]),
+            ]);
+        let lost = (2.0 / 3.0 * farthest).max(0.0);
+        // sqrt(1 - e) >= 1 - e/2 - e^2/2 for 0 <= e <= 1.
+        let shrink = 1.0 - 0.5 * lost * (1.0 + lost);
         Self {
             unit,
             length,
+            per_length,
             axis,
-            spread: Angle::from_cos(cos).plus(Angle::from_sin(pad)),
-            stretch: if shrink > 0.01 {
-                1.0 / shrink.min(1.0).sqrt()
+            spread: Angle::from_cos(cos).plus(Angle::small(pad)),
+            stretch: if lost < 0.9 {
+                1.0 / shrink
             } else {
                 f64::INFINITY
             },
@@ -148,6 +169,7 @@ impl Directions {
         Self {
             unit: vectors.map(DVec3::normalize_or_zero),
             length,
+            per_length: f64::INFINITY,
             axis: DVec3::Z,
             spread: Angle::STRAIGHT,
             stretch: f64::INFINITY,
@@ -165,11 +187,6 @@ impl Directions {
     }
 }
 
-/// The three pairs of corners.
-fn pairs() -> [(usize, usize); 3] {
-    [(0, 1), (0, 2), (1, 2)]
-}
-
 /// A quantity as it varies over a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Varying {
@@ -185,6 +202,7 @@ pub(super) struct Varying {
 
 impl Varying {
     /// Tightens a first interval by what `deviation` implies, and the deviation by the interval.
+    #[inline]
     pub(super) fn new(at: [f64; 3], lo: f64, hi: f64, deviation: f64) -> Self {
         let lo = lo.max(least(at) - deviation);
         let hi = hi.min(greatest(at) + deviation);
@@ -197,10 +215,15 @@ impl Varying {
     }
 
     /// The cosine of the angle between two directions.
+    #[inline]
     pub(super) fn cosine(x: &Directions, y: &Directions) -> Self {
         let apart = Angle::from_cos(x.axis.dot(y.axis));
         let spread = x.spread.plus(y.spread);
-        let at = std::array::from_fn(|i| x.unit[i].dot(y.unit[i]));
+        let at = [
+            x.unit[0].dot(y.unit[0]),
+            x.unit[1].dot(y.unit[1]),
+            x.unit[2].dot(y.unit[2]),
+        ];
         Self::new(
             at,
             apart.plus(spread).cos,
@@ -211,6 +234,7 @@ impl Varying {
 
     /// Bound of the deviation of the product with another from the interpolation of its corner values: with both written as
     /// linear part and rest, `sum w_i a_i b_i - lin(a) lin(b) = sum_{i<j} w_i w_j (a_i - a_j) (b_i - b_j)`.
+    #[inline]
     pub(super) fn product_deviation(&self, other: &Self) -> f64 {
         self.deviation * other.magnitude()
             + other.deviation * self.magnitude()
@@ -219,37 +243,52 @@ impl Varying {
     }
 
     /// The largest absolute corner value.
+    #[inline]
     fn magnitude(&self) -> f64 {
-        greatest(self.at.map(f64::abs))
+        magnitude(self.at)
     }
 
     /// How far apart the corner values are.
+    #[inline]
     pub(super) fn range(&self) -> f64 {
         greatest(self.at) - least(self.at)
     }
 }
 
+#[inline]
 fn deviation(x: &Directions, y: &Directions, f: [f64; 3]) -> f64 {
     let stretch = x.stretch * y.stretch;
     if !stretch.is_finite() {
         return f64::INFINITY;
     }
-    let (p, q) = (x.length, y.length);
-    let (p_least, q_least) = (least(p), least(q));
-    let brackets = pairs().map(|(i, j)| {
+    let (p, q) = (&x.length, &y.length);
+    let per_product = x.per_length * y.per_length;
+    let bracket = |i: usize, j: usize| {
         let turned = x.unit[i] * (p[i] * q[j]) - x.unit[j] * (p[j] * q[i]);
-        turned.dot(y.unit[j] - y.unit[i]).abs() / (p_least * q_least)
-            + ((p[i] - p[j]) * (f[i] - f[j])).abs() / p_least
-    });
-    greatest(f.map(f64::abs)) * (stretch - 1.0) + stretch * greatest(brackets) / 3.0 + x.pad + y.pad
+        turned.dot(y.unit[j] - y.unit[i]).abs() * per_product
+            + ((p[i] - p[j]) * (f[i] - f[j])).abs() * x.per_length
+    };
+    let brackets = [bracket(0, 1), bracket(0, 2), bracket(1, 2)];
+    magnitude(f) * (stretch - 1.0) + stretch * greatest(brackets) * (1.0 / 3.0) + x.pad + y.pad
 }
 
+#[inline]
+fn magnitude([a, b, c]: [f64; 3]) -> f64 {
+    greatest([a.abs(), b.abs(), c.abs()])
+}
+
+/// The least of numbers. Comparisons, as `f64::min` takes three times as long.
+#[inline]
 pub(super) fn least([a, b, c]: [f64; 3]) -> f64 {
-    a.min(b).min(c)
+    let ab = if b < a { b } else { a };
+    if c < ab { c } else { ab }
 }
 
+/// The greatest, likewise.
+#[inline]
 pub(super) fn greatest([a, b, c]: [f64; 3]) -> f64 {
-    a.max(b).max(c)
+    let ab = if b > a { b } else { a };
+    if c > ab { c } else { ab }
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 pub mod bound;
 mod cone;
 pub mod masks;
+mod power;
 pub mod signs;
 
 pub use bound::{FactorBound, LightBound, TriangleBound};
