@@ -3,7 +3,8 @@
 //! All cosines come from [`cone`](super::cone), as an interval (from cones, and from corner values) and a deviation from linear
 //! interpolation. On top of them:
 //!
-//! **Horizon.** Where `n.l` has no positive value, both terms are absent. Where it changes sign, the specular factor jumps, and
+//! **Horizon.** Where all nine products of a corner's normal and a corner's vector to the light are negative, so is `n.l` everywhere: it
+//! is a sum of them with positive weights. Lights behind are dismissed by this before anything is normalized. Where `n.l` has no positive value, both terms are absent. Where it changes sign, the specular factor jumps, and
 //! only its interval `[0, hi]` holds.
 //!
 //! **Phong.** Reflecting about a fixed `n` keeps angles; reflecting one vector about `n` and about `n'` gives results at most
@@ -142,14 +143,18 @@ impl TriangleBound {
     #[must_use]
     pub fn light(&self, light: &ShadingLight) -> LightBound {
         let at = vector(light.vector);
-        let to_light = if light.is_point {
-            let blur = self
-                .blur
-                .max(at.abs().max_element() * f64::from(f32::EPSILON));
-            Directions::new(from_corners(at, &self.corners), blur)
+        let (vectors, blur) = if light.is_point {
+            let size = at.abs().max_element() * f64::from(f32::EPSILON);
+            (from_corners(at, &self.corners), self.blur.max(size))
         } else {
-            Directions::constant(at)
+            ([at; 3], 0.0)
         };
+        if let Facing::One(normal, _) = &self.facing
+            && normal.face_away_from(&vectors, blur)
+        {
+            return LightBound::default();
+        }
+        let to_light = Directions::new(vectors, blur);
         match &self.facing {
             Facing::One(n, n_v) => self.light_on_side(&to_light, n, n_v),
             Facing::Both(sides) => {

@@ -165,6 +165,21 @@ impl Directions {
         Self::new([v; 3], 0.0)
     }
 
+    /// Whether the scalar product with `sum w_j Y_j` is proved negative everywhere, from the corners alone. `blur` is the size of
+    /// rounding errors in `Y`.
+    #[inline]
+    pub(super) fn face_away_from(&self, vectors: &[DVec3; 3], blur: f64) -> bool {
+        vectors.iter().all(|y| {
+            let pad = PAD * (y.x.abs() + y.y.abs() + y.z.abs()) + 2.0 * blur;
+            let greatest = greatest([
+                self.unit[0].dot(*y),
+                self.unit[1].dot(*y),
+                self.unit[2].dot(*y),
+            ]);
+            greatest < -pad
+        })
+    }
+
     fn wide(vectors: [DVec3; 3], length: [f64; 3]) -> Self {
         Self {
             unit: vectors.map(DVec3::normalize_or_zero),
@@ -311,5 +326,48 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// Two directions of every kind: nearly constant to wide, of equal and of very different lengths.
+    #[test]
+    fn cosines_obey_interval_and_deviation() {
+        let mut state = 3_u64;
+        let mut unit = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut useful = 0;
+        for case in 0..30_000 {
+            let mut direction = |spread: f64, constant: bool| {
+                let mut vector = || DVec3::new(unit() - 0.5, unit() - 0.5, unit() - 0.5);
+                let main = vector() * 2.0;
+                let corners = [vector(), vector(), vector()].map(|v| main + v * spread);
+                if constant {
+                    [main.normalize(); 3]
+                } else {
+                    corners.map(|v| v * 10_f64.powf(unit() * spread.min(1.0)))
+                }
+            };
+            let spread = [3.0, 1.0, 0.1, 0.01][case % 4];
+            let x = direction(spread, false);
+            let y = direction(spread, case % 3 == 0);
+            let bound = Varying::cosine(&Directions::new(x, 0.0), &Directions::new(y, 0.0));
+            useful += usize::from(bound.deviation < 0.1);
+            for _ in 0..20 {
+                let w = [unit(), unit(), unit()];
+                let sum: f64 = w.iter().sum();
+                let mix = |v: &[DVec3; 3]| (v[0] * w[0] + v[1] * w[1] + v[2] * w[2]).normalize();
+                let cosine = mix(&x).dot(mix(&y));
+                let interpolated = (0..3).map(|i| bound.at[i] * w[i]).sum::<f64>() / sum;
+                assert!(
+                    (bound.lo..=bound.hi).contains(&cosine)
+                        && (cosine - interpolated).abs() <= bound.deviation,
+                    "{cosine}, interpolated {interpolated}, is outside of {bound:?}"
+                );
+            }
+        }
+        assert!(useful > 10_000, "only {useful} bounds say anything");
     }
 }
