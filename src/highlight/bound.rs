@@ -1,6 +1,6 @@
 //! What a light can do on a triangle: intervals of its diffuse and specular factor, and how far they are from interpolation.
 //!
-//! All cosines come from [`cone`](super::cone), as an interval (from cones, and from corner values) and a deviation from linear
+//! All cosines come from the module `cone`, as an interval (from cones, and from corner values) and a deviation from linear
 //! interpolation. On top of them:
 //!
 //! **Horizon.** Where all nine products of a corner's normal and a corner's vector to the light are negative, so is `n.l` everywhere: it
@@ -84,18 +84,15 @@ pub struct TriangleBound {
     corners: [DVec3; 3],
     /// Size of rounding errors of interpolated positions.
     blur: f64,
-    facing: Facing,
+    normal: Directions,
+    /// The cosine between normal and viewer.
+    n_v: Varying,
+    /// Whether the normal may be turned on a part of the triangle only.
+    either_side: bool,
     to_viewer: Directions,
     specular: bool,
     model: ReflectionModel,
     exponent: f64,
-}
-
-/// The normals that take part, each with its cosine to the viewer.
-#[derive(Clone, Copy, Debug)]
-enum Facing {
-    One(Directions, Varying),
-    Both([(Directions, Varying); 2]),
 }
 
 impl TriangleBound {
@@ -114,24 +111,18 @@ impl TriangleBound {
             Eye::Point(eye) => Directions::new(from_corners(vector(eye), &corners), blur),
             Eye::Direction(direction) => Directions::constant(vector(direction)),
         };
-        let normal = Directions::new(triple(normals), 0.0);
-        let cosine = Varying::cosine(&normal, &to_viewer);
-        let back = || {
-            let reversed = normal.reversed();
-            (reversed, Varying::cosine(&reversed, &to_viewer))
-        };
-        let facing = if !material.two_sided || cosine.lo > 0.0 {
-            Facing::One(normal, cosine)
-        } else if cosine.hi < 0.0 {
-            let (normal, cosine) = back();
-            Facing::One(normal, cosine)
-        } else {
-            Facing::Both([(normal, cosine), back()])
-        };
+        let mut normal = Directions::new(triple(normals), 0.0);
+        let mut n_v = Varying::cosine(&normal, &to_viewer);
+        if material.two_sided && n_v.hi < 0.0 {
+            normal = normal.reversed();
+            n_v = n_v.negated();
+        }
         Self {
             corners,
             blur,
-            facing,
+            normal,
+            n_v,
+            either_side: material.two_sided && n_v.lo <= 0.0,
             to_viewer,
             specular: material.is_specular(),
             model: material.model,
@@ -149,20 +140,16 @@ impl TriangleBound {
         } else {
             ([at; 3], 0.0)
         };
-        if let Facing::One(normal, _) = &self.facing
-            && normal.face_away_from(&vectors, blur)
-        {
+        if !self.either_side && self.normal.face_away_from(&vectors, blur) {
             return LightBound::default();
         }
         let to_light = Directions::new(vectors, blur);
-        match &self.facing {
-            Facing::One(n, n_v) => self.light_on_side(&to_light, n, n_v),
-            Facing::Both(sides) => {
-                let [front, back] = sides
-                    .each_ref()
-                    .map(|(n, n_v)| self.light_on_side(&to_light, n, n_v));
-                front.hull(back)
-            }
+        let bound = self.light_on_side(&to_light, &self.normal, &self.n_v);
+        if self.either_side {
+            let (normal, n_v) = (self.normal.reversed(), self.n_v.negated());
+            bound.hull(self.light_on_side(&to_light, &normal, &n_v))
+        } else {
+            bound
         }
     }
 

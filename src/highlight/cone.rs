@@ -247,6 +247,17 @@ impl Varying {
         )
     }
 
+    /// The same with the opposite sign.
+    pub(super) fn negated(&self) -> Self {
+        let [a, b, c] = self.at;
+        Self {
+            at: [-a, -b, -c],
+            lo: -self.hi,
+            hi: -self.lo,
+            deviation: self.deviation,
+        }
+    }
+
     /// Bound of the deviation of the product with another from the interpolation of its corner values: with both written as
     /// linear part and rest, `sum w_i a_i b_i - lin(a) lin(b) = sum_{i<j} w_i w_j (a_i - a_j) (b_i - b_j)`.
     #[inline]
