@@ -3,7 +3,8 @@
 use glam::DVec3;
 use specula::geometry::Vec3s;
 use specula::highlight::{SignBits, TriangleBound, Verdict, compute_signs, light_masks, masks_of};
-use specula::illumination::reference::{Factors, factors, vector};
+use specula::illumination::reference::{Factors, factors, shade, vector};
+use specula::illumination::{ActiveLights, ShadingKit, shade_points};
 use specula::output::encode::encode;
 use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, World};
 use specula::simd::SimdLevel;
@@ -264,6 +265,74 @@ fn what_masks_leave_out_is_not_seen() {
         worst > 0.05,
         "the bound is so loose that this test shows nothing: {worst}"
     );
+}
+
+/// The same as a backend does it: positions, normals and the remainder interpolated in `f32`, terms evaluated in lanes.
+#[test]
+fn what_masks_leave_out_is_not_seen_in_single_precision_either() {
+    const PIXELS: usize = 29;
+    let mut random = Random(15);
+    let level = SimdLevel::detect().token().expect("detected");
+    let (mut compared, mut worst) = (0, 0.0_f64);
+    for round in 0..6_000 {
+        let case = random_case(&mut random, [1, 3, 9][round % 3]);
+        if case.material.shininess < 1.0 {
+            continue; // Its slope is infinite somewhere, or it jumps.
+        }
+        let count = case.lights.len();
+        let active = masks_of(
+            case.positions,
+            case.normals,
+            &case.eye,
+            &case.material,
+            &case.lights,
+        )
+        .active;
+        let weights: Vec<_> = (0..PIXELS)
+            .map(|index| random.weights(index).map(|w| w as f32))
+            .collect();
+        let mix = |corners: &[[f32; 3]; 3], w: &[f32; 3]| -> [f32; 3] {
+            std::array::from_fn(|c| {
+                w[0] * corners[0][c] + w[1] * corners[1][c] + w[2] * corners[2][c]
+            })
+        };
+        let (mut points, mut normals) = (Vec3s::default(), Vec3s::default());
+        for w in &weights {
+            points.push(mix(&case.positions, w));
+            normals.push(mix(&case.normals, w));
+        }
+        let kit = ShadingKit::new(case.eye, &case.material, &case.lights);
+        let run = |active: &ActiveLights| {
+            let mut out = Vec3s::default();
+            out.resize(PIXELS);
+            shade_points(level, &kit, active, 0..PIXELS, &points, &normals, &mut out);
+            out
+        };
+        let (full, part) = (run(&ActiveLights::all(count)), run(&active));
+        // The first three pixels are the corners.
+        let remainder = [0, 1, 2].map(|i| {
+            let (full, part) = (full.get(i), part.get(i));
+            std::array::from_fn(|c| full[c] - part[c])
+        });
+        for (i, w) in weights.iter().enumerate() {
+            let w64 = w.map(f64::from);
+            let sum: f64 = w64.iter().sum();
+            let w64 = w64.map(|w| w / sum);
+            let (point, normal) = (blend(&case.positions, w64), blend(&case.normals, w64));
+            let exact = shade(point, normal, &case.eye, &case.material, &case.lights);
+            if exact.smallest_cosine < 1e-5 || normal.length() < 0.1 {
+                continue;
+            }
+            compared += 1;
+            let added = mix(&remainder, w);
+            for c in 0..3 {
+                let got = encode(f64::from(part.get(i)[c] + added[c]));
+                worst = worst.max((got - encode(exact.rgb[c])).abs());
+            }
+        }
+    }
+    println!("worst error {worst} codes at {compared} pixels");
+    assert!(worst <= 0.55 && compared > 100_000, "{worst}, {compared}");
 }
 
 /// On a smooth surface the deviation shrinks with the square of the triangle's size, so that fine meshes need no refinement.
