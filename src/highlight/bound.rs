@@ -176,10 +176,20 @@ impl TriangleBound {
         n_l: &Varying,
     ) -> FactorBound {
         let v = &self.to_viewer;
+        let (lo, hi) = match self.model {
+            ReflectionModel::Phong => reflected_cone(l, n, v),
+            ReflectionModel::BlinnPhong => halfway_cone(l, n, v),
+        };
+        if hi <= 0.0 {
+            return FactorBound::default();
+        }
+        if is_flushed(hi, self.exponent) {
+            return FLUSHED;
+        }
         let l_v = Varying::cosine(l, v);
         let base = match self.model {
-            ReflectionModel::Phong => phong_base(l, n, v, n_l, n_v, &l_v),
-            ReflectionModel::BlinnPhong => blinn_base(l, n, v, n_l, n_v, &l_v),
+            ReflectionModel::Phong => phong_base(lo, hi, n_l, n_v, &l_v),
+            ReflectionModel::BlinnPhong => blinn_base(lo, hi, n_l, n_v, &l_v),
         };
         power(&base, n_l, self.exponent)
     }
@@ -207,47 +217,40 @@ fn clamped(x: &Varying) -> FactorBound {
     }
 }
 
-/// `r.v`.
-fn phong_base(
-    l: &Directions,
-    n: &Directions,
-    v: &Directions,
-    n_l: &Varying,
-    n_v: &Varying,
-    l_v: &Varying,
-) -> Varying {
+/// Least and greatest `r.v` by the cones.
+fn reflected_cone(l: &Directions, n: &Directions, v: &Directions) -> (f64, f64) {
     let reflected = n.axis * (2.0 * n.axis.dot(l.axis)) - l.axis;
     let apart = Angle::from_cos(reflected.dot(v.axis));
     let spread = l.spread.plus(v.spread).plus(n.spread).plus(n.spread);
-    Varying::new(
-        std::array::from_fn(|i| 2.0 * n_l.at[i] * n_v.at[i] - l_v.at[i]),
-        apart.plus(spread).cos,
-        apart.minus(spread).cos,
-        2.0 * n_l.product_deviation(n_v) + l_v.deviation + PAD,
-    )
+    (apart.plus(spread).cos, apart.minus(spread).cos)
 }
 
-/// `n.h`.
-fn blinn_base(
-    l: &Directions,
-    n: &Directions,
-    v: &Directions,
-    n_l: &Varying,
-    n_v: &Varying,
-    l_v: &Varying,
-) -> Varying {
+/// Least and greatest `n.h` by the cones.
+fn halfway_cone(l: &Directions, n: &Directions, v: &Directions) -> (f64, f64) {
     let half = l.axis + v.axis;
+    let per_length = 1.0 / half.length();
     // The chord of an angle is 2 sin(angle / 2).
     let chord = |angle: Angle| (2.0 - 2.0 * angle.cos).max(0.0).sqrt();
-    let turn = (chord(l.spread) + chord(v.spread)) / half.length();
+    let turn = (chord(l.spread) + chord(v.spread)) * per_length;
     // False for NaN too: opposite axes.
-    let (lo, hi) = if turn < 1.0 {
-        let apart = Angle::from_cos(n.axis.dot(half.normalize_or_zero()));
+    if turn < 1.0 {
+        let apart = Angle::from_cos(n.axis.dot(half) * per_length);
         let spread = Angle::from_sin(turn).plus(n.spread);
         (apart.plus(spread).cos, apart.minus(spread).cos)
     } else {
         (-1.0, 1.0)
-    };
+    }
+}
+
+/// `r.v`, given its interval by the cones.
+fn phong_base(lo: f64, hi: f64, n_l: &Varying, n_v: &Varying, l_v: &Varying) -> Varying {
+    let at = |i: usize| 2.0 * n_l.at[i] * n_v.at[i] - l_v.at[i];
+    let deviation = 2.0 * n_l.product_deviation(n_v) + l_v.deviation + PAD;
+    Varying::new([at(0), at(1), at(2)], lo, hi, deviation)
+}
+
+/// `n.h`, given its interval by the cones.
+fn blinn_base(lo: f64, hi: f64, n_l: &Varying, n_v: &Varying, l_v: &Varying) -> Varying {
     let u_lo = 1.0 + l_v.lo;
     if u_lo < 0.01 {
         // The corner values may be anything in the interval.
@@ -270,36 +273,49 @@ fn blinn_base(
             + 3.0 / 8.0 * cube * root * root * l_v.range() * l_v.range(),
     };
     let sum = Varying {
-        at: std::array::from_fn(|i| n_l.at[i] + n_v.at[i]),
+        at: [
+            n_l.at[0] + n_v.at[0],
+            n_l.at[1] + n_v.at[1],
+            n_l.at[2] + n_v.at[2],
+        ],
         lo: n_l.lo + n_v.lo,
         hi: n_l.hi + n_v.hi,
         deviation: n_l.deviation + n_v.deviation,
     };
     Varying::new(
-        std::array::from_fn(|i| sum.at[i] * psi.at[i]),
+        [
+            sum.at[0] * psi.at[0],
+            sum.at[1] * psi.at[1],
+            sum.at[2] * psi.at[2],
+        ],
         lo,
         hi,
         sum.product_deviation(&psi) + PAD,
     )
 }
 
-/// `-ln(FLUSH)`.
-const FLUSH_DEPTH: f64 = 24.0 * std::f64::consts::LN_2;
+/// A power that is below the flush everywhere is nothing in the picture.
+const FLUSHED: FactorBound = FactorBound {
+    lo: 0.0,
+    hi: FLUSH,
+    deviation: FLUSH,
+};
+
+/// Whether `c^s <= exp(-s (1 - c))` is below the flush.
+#[inline]
+fn is_flushed(c: f64, exponent: f64) -> bool {
+    const DEPTH: f64 = 24.0 * std::f64::consts::LN_2;
+    exponent * (1.0 - c) > DEPTH
+}
 
 /// The base to the exponent where it is positive and the light is in front.
 fn power(base: &Varying, n_l: &Varying, exponent: f64) -> FactorBound {
-    // c^s <= exp(-s (1 - c)), and what is below the flush is nothing in the picture.
-    let flushed = |c: f64| exponent * (1.0 - c) > FLUSH_DEPTH;
     let c = base.hi.min(1.0);
     if c <= 0.0 {
         return FactorBound::default();
     }
-    if flushed(c) {
-        return FactorBound {
-            lo: 0.0,
-            hi: FLUSH,
-            deviation: FLUSH,
-        };
+    if is_flushed(c, exponent) {
+        return FLUSHED;
     }
     let smooth = exponent >= 2.0 && n_l.lo > 0.0;
     let (hi, mut deviation) = if smooth {
@@ -317,7 +333,7 @@ fn power(base: &Varying, n_l: &Varying, exponent: f64) -> FactorBound {
     let hi = hi.min(1.0);
     // A lower bound is only worth its cost where there is something to see.
     let visible = hi > 1.0 / 4096.0 && n_l.lo > 0.0 && base.lo > 0.0;
-    let lo = if visible && !flushed(base.lo) {
+    let lo = if visible && !is_flushed(base.lo, exponent) {
         power_below(base.lo.min(c), exponent)
     } else {
         0.0

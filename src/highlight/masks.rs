@@ -15,6 +15,7 @@
 //! A term that is absent has `hi = 0` and costs nothing. What [`shade_lanes`](crate::illumination::shade_lanes) itself errs is not part of it.
 
 use super::bound::{LightBound, TriangleBound};
+use super::power::power_below;
 use crate::illumination::{ActiveLights, LightMask, MAX_LIGHTS};
 use crate::scene::{Eye, ShadingLight, ShadingMaterial, World};
 
@@ -191,9 +192,8 @@ fn budget(lo: f64) -> f64 {
     } else if lo <= 0.003_130_8 {
         HALF_CODE / 12.92
     } else {
-        // encode' = 1.055 / 2.4 x^(-7/12), and x^(7/12) = x^(1/2) x^(1/12).
-        let twelfth_root = libm::cbrt(lo).sqrt().sqrt();
-        HALF_CODE * 2.4 / 1.055 * lo.sqrt() * twelfth_root
+        // encode' = 1.055 / 2.4 x^(-7/12)
+        HALF_CODE * 2.4 / 1.055 * power_below(lo, 7.0 / 12.0)
     }
 }
 
