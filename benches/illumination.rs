@@ -1,10 +1,12 @@
-//! Cost of shading a point under 1, 4 and 16 point lights, at every SIMD level; throughput is in point-lights.
+//! Cost of shading a point under 1, 4 and 16 point lights, at every SIMD level (throughput is in point-lights), and of encoding a pixel.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use fearless_simd::prelude::*;
 use specula::geometry::Vec3s;
 use specula::illumination::{ActiveLights, ShadingKit, shade_points};
+use specula::output::encode::encode_lanes;
 use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial};
-use specula::simd::SimdLevel;
+use specula::simd::{Simd, SimdLevel, dispatch};
 use std::hint::black_box;
 
 const POINTS: usize = 1024;
@@ -64,5 +66,37 @@ fn shading(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, shading);
+#[inline(always)]
+fn encode_all<S: Simd>(simd: S, rgb: &Vec3s, out: &mut [u32]) {
+    for (index, chunk) in out.chunks_exact_mut(S::f32s::LEN).enumerate() {
+        let at = index * S::f32s::LEN;
+        let end = at + S::f32s::LEN;
+        let lanes = [
+            S::f32s::from_slice(simd, &rgb.x[at..end]),
+            S::f32s::from_slice(simd, &rgb.y[at..end]),
+            S::f32s::from_slice(simd, &rgb.z[at..end]),
+        ];
+        encode_lanes(simd, lanes).store_slice(chunk);
+    }
+}
+
+fn encoding(c: &mut Criterion) {
+    let (rgb, _) = patch();
+    let mut out = vec![0; POINTS];
+    let mut group = c.benchmark_group("encode");
+    group.throughput(Throughput::Elements(POINTS as u64));
+    for level in SimdLevel::available() {
+        let Some(token) = level.token() else { continue };
+        group.bench_function(level.name(), |b| {
+            b.iter(|| {
+                let rgb = black_box(&rgb);
+                dispatch!(token, simd => encode_all(simd, rgb, &mut out));
+                black_box(&mut out);
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, shading, encoding);
 criterion_main!(benches);

@@ -325,9 +325,9 @@ fn what_masks_leave_out_is_not_seen_in_single_precision_either() {
             }
             compared += 1;
             let added = mix(&remainder, w);
-            for c in 0..3 {
-                let got = encode(f64::from(part.get(i)[c] + added[c]));
-                worst = worst.max((got - encode(exact.rgb[c])).abs());
+            for ((part, added), exact) in part.get(i).iter().zip(added).zip(exact.rgb) {
+                let got = encode(f64::from(part + added));
+                worst = worst.max((got - encode(exact)).abs());
             }
         }
     }

@@ -20,6 +20,7 @@
 //!
 //! Normals of two-sided materials are turned towards the viewer first.
 
+use crate::illumination::batch::{MAX_LANES, gather};
 use crate::illumination::{LightMask, MAX_LIGHTS};
 use crate::scene::{Eye, ShadingLight, World};
 use crate::simd::{Level, Simd, dispatch};
@@ -83,26 +84,37 @@ pub fn compute_signs(level: Level, world: &World, eye: Eye, vertices: &[u32], bi
 #[inline(always)]
 fn signs_of_list<S: Simd>(simd: S, world: &World, eye: Eye, vertices: &[u32], bits: &mut SignBits) {
     for group in vertices.chunks(S::f32s::LEN) {
-        let index = |lane: usize| *group.get(lane).unwrap_or(&group[0]) as usize;
-        let point = gather(simd, &world.positions, index);
-        let mut normal = gather(simd, &world.normals, index);
+        let mut places = [group[0] as usize; MAX_LANES];
+        for (place, &vertex) in places.iter_mut().zip(group) {
+            *place = vertex as usize;
+        }
+        let point = gather(simd, &world.positions, &places);
+        let mut normal = gather(simd, &world.normals, &places);
         let to_viewer = match eye {
             Eye::Point(eye) => towards(simd, eye, point),
-            Eye::Direction(direction) => direction.map(|c| S::f32s::splat(simd, c)),
+            Eye::Direction(direction) => splat3(simd, direction),
         };
         let zero = S::f32s::splat(simd, 0.0);
-        let two_sided = S::f32s::from_fn(simd, |lane| {
-            let material = world.vertex_material[index(lane)];
-            f32::from(world.materials[usize::from(material)].two_sided)
-        });
+        let mut two_sided = [0.0; MAX_LANES];
+        for (flag, &place) in two_sided.iter_mut().zip(&places) {
+            let material = world.vertex_material[place];
+            *flag = f32::from(world.materials[usize::from(material)].two_sided);
+        }
+        let two_sided = S::f32s::from_slice(simd, &two_sided[..S::f32s::LEN]);
         let turned = dot::<S>(to_viewer, normal).simd_lt(zero) & two_sided.simd_gt(zero);
-        normal = normal.map(|c| turned.select(-c, c));
+        normal = [
+            turned.select(-normal[0], normal[0]),
+            turned.select(-normal[1], normal[1]),
+            turned.select(-normal[2], normal[2]),
+        ];
 
         for (planes, lights) in bits.words.iter_mut().zip(world.lights.chunks(WORD_LIGHTS)) {
             let words = signs_of_lights(simd, lights, point, normal, to_viewer);
             for (plane, word) in planes.iter_mut().zip(words) {
-                for (lane, &vertex) in group.iter().enumerate() {
-                    plane[vertex as usize] = word[lane];
+                let mut values = [0; MAX_LANES];
+                word.store_slice(&mut values[..S::u32s::LEN]);
+                for (&vertex, &value) in group.iter().zip(&values) {
+                    plane[vertex as usize] = value;
                 }
             }
         }
@@ -127,7 +139,7 @@ fn signs_of_lights<S: Simd>(
         let l = if light.is_point {
             towards(simd, light.vector, point)
         } else {
-            light.vector.map(|c| S::f32s::splat(simd, c))
+            splat3(simd, light.vector)
         };
         let cross = [
             l[1] * v[2] - l[2] * v[1],
@@ -156,16 +168,21 @@ fn dot<S: Simd>(a: [S::f32s; 3], b: [S::f32s; 3]) -> S::f32s {
 
 #[inline(always)]
 fn towards<S: Simd>(simd: S, target: [f32; 3], from: [S::f32s; 3]) -> [S::f32s; 3] {
-    std::array::from_fn(|i| S::f32s::splat(simd, target[i]) - from[i])
+    let target = splat3(simd, target);
+    [
+        target[0] - from[0],
+        target[1] - from[1],
+        target[2] - from[2],
+    ]
 }
 
 #[inline(always)]
-fn gather<S: Simd>(
-    simd: S,
-    v: &crate::geometry::Vec3s,
-    index: impl Fn(usize) -> usize,
-) -> [S::f32s; 3] {
-    [&v.x, &v.y, &v.z].map(|c| S::f32s::from_fn(simd, |lane| c[index(lane)]))
+fn splat3<S: Simd>(simd: S, v: [f32; 3]) -> [S::f32s; 3] {
+    [
+        S::f32s::splat(simd, v[0]),
+        S::f32s::splat(simd, v[1]),
+        S::f32s::splat(simd, v[2]),
+    ]
 }
 
 #[cfg(test)]

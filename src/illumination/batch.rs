@@ -9,7 +9,7 @@ use fearless_simd::prelude::*;
 use std::ops::Range;
 
 /// Most lanes a vector of `f32` has at any level.
-const MAX_LANES: usize = 16;
+pub(crate) const MAX_LANES: usize = 16;
 
 /// Colours of the points in `range`, into the same places of `out`.
 ///
@@ -103,16 +103,23 @@ fn shade_gathered<S: Simd>(
     let Some(&last) = indices.last() else {
         return;
     };
-    let index = |lane: usize| indices.get(lane).copied().unwrap_or(last) as usize;
+    let mut places = [last as usize; MAX_LANES];
+    for (place, &index) in places.iter_mut().zip(indices) {
+        *place = index as usize;
+    }
     let rgb = shade_lanes(
         simd,
         kit,
         active,
-        gather(simd, points, index),
-        gather(simd, normals, index),
+        gather(simd, points, &places),
+        gather(simd, normals, &places),
     );
-    for (lane, &index) in indices.iter().enumerate() {
-        out.set(index as usize, rgb.map(|channel| channel[lane]));
+    for (channel, out) in rgb.iter().zip([&mut out.x, &mut out.y, &mut out.z]) {
+        let mut values = [0.0; MAX_LANES];
+        channel.store_slice(&mut values[..S::f32s::LEN]);
+        for (&index, &value) in indices.iter().zip(&values) {
+            out[index as usize] = value;
+        }
     }
 }
 
@@ -125,7 +132,22 @@ fn load<S: Simd>(simd: S, v: &Vec3s, chunk: Range<usize>) -> [S::f32s; 3] {
     ]
 }
 
+/// The vectors at the given places, one per lane.
 #[inline(always)]
-fn gather<S: Simd>(simd: S, v: &Vec3s, index: impl Fn(usize) -> usize) -> [S::f32s; 3] {
-    [&v.x, &v.y, &v.z].map(|c| S::f32s::from_fn(simd, |lane| c[index(lane)]))
+pub(crate) fn gather<S: Simd>(simd: S, v: &Vec3s, places: &[usize; MAX_LANES]) -> [S::f32s; 3] {
+    [
+        gather_component(simd, &v.x, places),
+        gather_component(simd, &v.y, places),
+        gather_component(simd, &v.z, places),
+    ]
+}
+
+/// Through memory: vector operations must stay out of closures, which are not always inlined.
+#[inline(always)]
+fn gather_component<S: Simd>(simd: S, from: &[f32], places: &[usize; MAX_LANES]) -> S::f32s {
+    let mut values = [0.0; MAX_LANES];
+    for (value, &place) in values.iter_mut().zip(&places[..S::f32s::LEN]) {
+        *value = from[place];
+    }
+    S::f32s::from_slice(simd, &values[..S::f32s::LEN])
 }

@@ -47,7 +47,8 @@ impl<'a> ShadingKit<'a> {
     }
 }
 
-/// Three components in lanes.
+/// Three components in lanes. (They are written out one by one below: `array::map` and `from_fn` are not always inlined, and
+/// a vector operation outside of the dispatched function is ten times slower.)
 type Lanes3<S> = [<S as Simd>::f32s; 3];
 
 #[inline(always)]
@@ -60,9 +61,23 @@ fn sub<S: Simd>(a: Lanes3<S>, b: Lanes3<S>) -> Lanes3<S> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+/// `a * b + c`, component by component.
+#[inline(always)]
+fn madd3<S: Simd>(a: Lanes3<S>, b: Lanes3<S>, c: Lanes3<S>) -> Lanes3<S> {
+    [
+        a[0].mul_add(b[0], c[0]),
+        a[1].mul_add(b[1], c[1]),
+        a[2].mul_add(b[2], c[2]),
+    ]
+}
+
 #[inline(always)]
 fn splat3<S: Simd>(simd: S, v: [f32; 3]) -> Lanes3<S> {
-    v.map(|c| S::f32s::splat(simd, c))
+    [
+        S::f32s::splat(simd, v[0]),
+        S::f32s::splat(simd, v[1]),
+        S::f32s::splat(simd, v[2]),
+    ]
 }
 
 /// The unit vector and the squared length; a zero vector stays zero.
@@ -70,7 +85,7 @@ fn splat3<S: Simd>(simd: S, v: [f32; 3]) -> Lanes3<S> {
 fn normalize<S: Simd>(simd: S, v: Lanes3<S>) -> (Lanes3<S>, S::f32s) {
     let squared = dot::<S>(v, v);
     let scale = rsqrt_lanes(simd, squared);
-    (v.map(|c| c * scale), squared)
+    ([v[0] * scale, v[1] * scale, v[2] * scale], squared)
 }
 
 /// Linear, unclamped colours: ambient light and the terms of the active lights. Normals may have any length.
@@ -102,7 +117,11 @@ pub fn shade_lanes<S: Simd>(
     };
     if material.two_sided {
         let away = dot::<S>(n, v).simd_lt(zero);
-        n = n.map(|c| away.select(-c, c));
+        n = [
+            away.select(-n[0], n[0]),
+            away.select(-n[1], n[1]),
+            away.select(-n[2], n[2]),
+        ];
     }
 
     let mut diffuse_sum = [zero; 3];
@@ -121,15 +140,19 @@ pub fn shade_lanes<S: Simd>(
         }
         let radiance = splat3(simd, light.radiance);
         let diffuse = lit.select(cosine, zero);
-        diffuse_sum = accumulate::<S>(diffuse_sum, radiance, diffuse);
+        diffuse_sum = madd3::<S>(radiance, [diffuse; 3], diffuse_sum);
         if !specular.contains(index) {
             continue;
         }
         let (d, defined) = match material.model {
             ReflectionModel::Phong => {
                 let twice = cosine + cosine;
-                let r_minus_v: Lanes3<S> =
-                    std::array::from_fn(|i| twice.mul_add(n[i], -l[i]) - v[i]);
+                let r = [
+                    twice.mul_add(n[0], -l[0]),
+                    twice.mul_add(n[1], -l[1]),
+                    twice.mul_add(n[2], -l[2]),
+                ];
+                let r_minus_v = sub::<S>(r, v);
                 (dot::<S>(r_minus_v, r_minus_v) * splat(0.5), lit & seen)
             }
             ReflectionModel::BlinnPhong => {
@@ -145,13 +168,15 @@ pub fn shade_lanes<S: Simd>(
             continue;
         }
         let power = visible.select(kit.power.lanes(simd, d), zero);
-        specular_sum = accumulate::<S>(specular_sum, radiance, power);
+        specular_sum = madd3::<S>(radiance, [power; 3], specular_sum);
     }
 
-    std::array::from_fn(|i| {
-        let matte = splat(material.diffuse[i]).mul_add(diffuse_sum[i], splat(material.ambient[i]));
-        splat(material.specular[i]).mul_add(specular_sum[i], matte)
-    })
+    let matte = madd3::<S>(
+        splat3(simd, material.diffuse),
+        diffuse_sum,
+        splat3(simd, material.ambient),
+    );
+    madd3::<S>(splat3(simd, material.specular), specular_sum, matte)
 }
 
 /// The lights that have an active term, ascending.
@@ -165,9 +190,4 @@ fn active_lights<'a>(
         .diffuse
         .iter()
         .map_while(move |index| lights.get(index).map(|light| (index, light)))
-}
-
-#[inline(always)]
-fn accumulate<S: Simd>(sum: Lanes3<S>, radiance: Lanes3<S>, factor: S::f32s) -> Lanes3<S> {
-    std::array::from_fn(|i| radiance[i].mul_add(factor, sum[i]))
 }

@@ -85,13 +85,17 @@ pub fn encode_codes_lanes<S: Simd>(simd: S, linear: S::f32s) -> S::f32s {
 /// Opaque pixels of linear colours: `to_le_bytes` of a lane is `[red, green, blue, 255]`.
 #[inline(always)]
 pub fn encode_lanes<S: Simd>(simd: S, rgb: [S::f32s; 3]) -> S::u32s {
-    let byte = |linear: S::f32s| -> S::u32s {
-        let code = encode_codes_lanes(simd, linear) + S::f32s::splat(simd, 0.5);
-        // In [0.5, 255.5]: through i32, which every instruction set converts to.
-        code.to_int::<S::i32s>().bitcast()
-    };
-    let [r, g, b] = rgb.map(byte);
+    let r = byte_lanes(simd, rgb[0]);
+    let g = byte_lanes(simd, rgb[1]);
+    let b = byte_lanes(simd, rgb[2]);
     r | (g << 8) | (b << 16) | S::u32s::splat(simd, 0xff00_0000)
+}
+
+#[inline(always)]
+fn byte_lanes<S: Simd>(simd: S, linear: S::f32s) -> S::u32s {
+    let code = encode_codes_lanes(simd, linear) + S::f32s::splat(simd, 0.5);
+    // In [0.5, 255.5]: through i32, which every instruction set converts to.
+    code.to_int::<S::i32s>().bitcast()
 }
 
 #[cfg(test)]
