@@ -217,6 +217,120 @@ proptest! {
     }
 }
 
+/// A cluster of a few triangles whose normals are near `axis`: places, tilts, lengths and relative heights are random,
+/// from needles to equilateral.
+fn bundles() -> impl Strategy<Value = Mesh> {
+    let unit = || prop::array::uniform3(-1.0_f64..1.0).prop_map(DVec3::from);
+    let height = prop_oneof![-6.0..0.0, -0.5..0.5];
+    let triangle = (unit(), unit(), unit(), -2.0..0.0, height, -1.0..2.0);
+    (unit(), prop::collection::vec(triangle, 1..4)).prop_map(|(axis, triangles)| {
+        let mut mesh = Mesh::default();
+        for (at, tilt, along, length, height, skew) in triangles {
+            let normal = (axis + 0.3 * axis.length() * tilt).normalize_or(DVec3::X);
+            let base = along.cross(normal).normalize_or(DVec3::Y) * libm::exp10(length);
+            let apex = base * skew + normal.cross(base) * libm::exp10(height);
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend([at, at + base, at + apex]);
+            mesh.triangles.push([first, first + 1, first + 2]);
+        }
+        mesh
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, cases: 4000, ..ProptestConfig::default() })]
+
+    /// The facing test where it is close: few triangles, a near eye, a near plane that may cut off a corner by a hair.
+    #[test]
+    fn nothing_that_faces_the_eye_is_dropped(
+        mesh in bundles(),
+        camera in cameras(),
+        eye in prop::array::uniform3(-3.0_f64..3.0),
+        cut in prop::option::of(-7.0..-1.0),
+    ) {
+        let model = Model::new(&mesh, DMat4::IDENTITY);
+        let mut camera = Camera {
+            eye: DVec3::from(eye),
+            target: DVec3::ZERO,
+            width: 4000,
+            height: 4000,
+            far: 100.0,
+            ..camera
+        };
+        camera.near = 1e-2;
+        if let (Some(exponent), false) = (cut, camera.parallel) {
+            // Cuts off the nearest corner.
+            let view = camera.view();
+            let depth = (0..model.positions.len())
+                .map(|v| view.project(model.positions.get(v))[3])
+                .fold(f64::INFINITY, f64::min);
+            camera.near = (depth * (1.0 + libm::exp10(exponent))).max(1e-2);
+        }
+        check(&model, &camera.view(), false);
+    }
+}
+
+/// Seen through its narrow end, the inside of a steep funnel shows although its axis points away and passes through the
+/// eye: what faces the eye is off the axis.
+#[test]
+fn the_inside_of_a_funnel_is_kept() {
+    let mut mesh = Mesh::default();
+    for i in 0..6 {
+        let (sin, cos) = libm::sincos(f64::from(i) * std::f64::consts::TAU / 6.0);
+        let outwards = DVec3::new(cos, sin, 0.0);
+        let normal = (-0.906 * outwards - 0.423 * DVec3::Z).normalize();
+        let side = outwards.cross(DVec3::Z) * 0.2;
+        let first = mesh.positions.len() as u32;
+        for corner in [DVec3::ZERO, side, normal.cross(side)] {
+            mesh.positions.push(outwards + corner);
+        }
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    let model = Model::new(&mesh, DMat4::IDENTITY);
+    let camera = Camera {
+        eye: DVec3::Z * 2.0,
+        near: 0.1,
+        scale: 200.0,
+        ..FROM_OUTSIDE
+    };
+    let view = camera.view();
+    assert!((0..6).any(|t| model.is_visible(&view, t, false)));
+    check(&model, &view, false);
+}
+
+#[test]
+fn specks_at_the_border_of_the_image_are_kept() {
+    // One unit is one pixel; world x and z are pixel x and, upwards, y about the image's middle.
+    let camera = Camera {
+        eye: DVec3::NEG_Y * 5.0,
+        target: DVec3::ZERO,
+        width: 20,
+        height: 16,
+        scale: 1.0,
+        parallel: true,
+        ..FROM_OUTSIDE
+    };
+    let view = camera.view();
+    let (mut drawn, mut dropped) = (0, 0);
+    let upright = DMat4::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    for step in 0..200 {
+        let outwards = f64::from(step) * 0.03 - 3.0;
+        for (side, half) in [
+            (DVec3::X, 10.0),
+            (DVec3::NEG_X, 10.0),
+            (DVec3::Z, 8.0),
+            (DVec3::NEG_Z, 8.0),
+        ] {
+            let at = DMat4::from_translation(side * (half + outwards)) * upright;
+            let model = Model::new(&shapes::plane(1.2, 1.2, 1, 1), at);
+            let counts = check(&model, &view, false);
+            drawn += u32::from((0..2).any(|t| model.is_visible(&view, t, false)));
+            dropped += counts.outside_frustum;
+        }
+    }
+    assert!(drawn > 200 && dropped > 100, "{drawn} {dropped}");
+}
+
 /// Fine meshes seen so small, or so flat, that snapping turns triangles around. Clusters that face away by less than
 /// that must stay.
 #[test]
