@@ -1,13 +1,13 @@
 //! Linear functions of a world point, bounded over boxes and balls.
 //!
 //! Clipping planes and the depth `w` are linear combinations of the rows of `pixel_from_world`, hence functions
-//! `f(p) = n . p + d` of the world point. Over the box of centre c and half-size h, f lies within `|n| . h` (componentwise)
-//! of `f(c)`; over the ball of centre c and radius r, within `|n| r`. Ranges are widened by `ROUNDING` times the sum
-//! of the magnitudes of all terms, including those that cancelled when rows were combined. That covers the rounding
-//! here as well as in what it is compared with: projecting a vertex (8 roundings), measuring its distance from the
-//! clipping planes (2) and moving it along edges by clipping (3 for each of 6 planes, every result a convex
-//! combination of vertices). So when a range over a set of triangles is negative, `f` is negative at every vertex
-//! that clipping these triangles yields, as computed.
+//! `f(p) = n . p + d` of the world point. Over the box of centre c and half-size h, f lies within `|n| . h`
+//! (componentwise) of `f(c)`; over the ball of centre c and radius r, within `|n| r`. Ranges are widened by `ROUNDING`
+//! times the sum of the magnitudes of all terms, including those that cancelled when rows were combined. That covers
+//! the rounding here as well as in what it is compared with: projecting a vertex (8 roundings), measuring its distance
+//! from the clipping planes (2) and moving it along edges by clipping (3 for each of 6 planes, every result a convex
+//! combination of vertices). So when a range over a set of triangles is negative, `f` is negative at every vertex that
+//! clipping these triangles yields, as computed.
 
 use glam::{DMat4, DVec3, DVec4};
 
