@@ -42,15 +42,15 @@ fn plane_distances(p: PixelPoint) -> [f64; 6] {
     [w - z, z, guard + x, guard - x, guard + y, guard - y]
 }
 
-/// A bit for each clipping plane that `p` is outside of: near, far, left, right, top, bottom.
-/// NaN is outside of everything.
+/// A bit for each clipping plane that `p` is outside of: near, far, left, right, top, bottom; and one more for a point that is
+/// not in front of the eye, which says nothing about the planes. NaN is outside of everything. A triangle whose corners share a
+/// bit has no visible point.
 #[inline]
 #[must_use]
 pub fn outcode(p: PixelPoint) -> u8 {
-    let mut code = 0;
+    let mut code = u8::from(p[3] <= 0.0 || p[3].is_nan()) << 6;
     for (bit, distance) in plane_distances(p).into_iter().enumerate() {
-        // `w > 0` comes with the near plane; asking again keeps a zero matrix out.
-        let inside = distance >= 0.0 && p[3] > 0.0;
+        let inside = distance >= 0.0;
         code |= u8::from(!inside) << bit;
     }
     code
@@ -409,6 +409,48 @@ mod tests {
         let behind = inside.map(|[x, y, z, w]| [-x, -y, -z, -w]);
         assert!(clip(behind).vertices().is_empty());
         assert!(behind.iter().all(|&p| outcode(p) != 0));
+        assert_eq!(outcode([f64::NAN; 4]), 0x7f);
+        assert_ne!(outcode([0.0; 4]), 0);
+    }
+
+    #[test]
+    fn corners_that_share_an_outcode_leave_nothing_to_clip() {
+        // The first corner is behind the eye, yet on the inner side of the plane that the others are outside of.
+        let far_right = 2.0 * GUARD_BAND_PX;
+        let triangle = [
+            [far_right, 0.0, 1.0, -1.0],
+            [-far_right, 1.0, 0.5, 1.0],
+            [-far_right, -1.0, 0.5, 1.0],
+        ];
+        let codes = triangle.map(outcode);
+        assert_eq!(codes[0] & codes[1] & codes[2], 0);
+        // Any mixture of coordinates: where a bit is shared, clipping agrees.
+        let values = [-2.0, -0.5, 0.0, 0.25, 1.5];
+        let mut state = 1_u32;
+        let mut next = |scale: f64| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            values[(state >> 24) as usize % values.len()] * scale
+        };
+        let mut shared = 0;
+        for _ in 0..100_000 {
+            let mut p = || {
+                [
+                    next(GUARD_BAND_PX),
+                    next(GUARD_BAND_PX),
+                    next(1.0),
+                    next(1.0),
+                ]
+            };
+            let triangle = [p(), p(), p()];
+            let codes = triangle.map(outcode);
+            if codes[0] & codes[1] & codes[2] != 0 {
+                shared += 1;
+                let left = clip(triangle);
+                let seen = left.vertices().iter().any(|p| p[3] > 0.0);
+                assert!(!seen, "{triangle:?} left {left:?}");
+            }
+        }
+        assert!(shared > 1000, "{shared}");
     }
 
     #[test]

@@ -1,1 +1,218 @@
-//! The tiled SIMD rasterizer with a visibility buffer.
+//! A tiled software rasterizer in SIMD lanes.
+//!
+//! One image goes through passes, each parallel over pieces that have one owner:
+//!
+//! | pass | over | does |
+//! |---|---|---|
+//! | [`transform`] | blocks of vertices | pixel space, clipping planes, sub-pixel grid |
+//! | [`setup`] | [`shares`] of triangles | culls, clips, plans depth, sorts into tiles |
+//! | [`raster`] | [tiles](tile) | coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them |
+//! | [`visible`] | tiles, then visible triangles | counts owners' pixels, prepares their barycentric planes |
+//! | [`resolve`] | tiles | colours |
+//! | [`repaint`] | tiles | colours of parts of triangles |
+//! | [`present`] | bands of tiles | copies changed tiles to a frame |
+//!
+//! No pass's result depends on the number of threads, nor coverage, depth and ids on the SIMD level. All memory is kept from
+//! image to image.
+
+mod lanes;
+mod present;
+mod raster;
+mod repaint;
+mod resolve;
+mod setup;
+mod shares;
+mod tile;
+mod transform;
+mod visible;
+
+pub use tile::NO_TRIANGLE;
+
+use super::{Backend, BasePaint, Capabilities, Geometry, Patch, RasterCounts};
+use crate::output::Frame;
+use crate::output::frame::Stamp;
+use crate::parallel::Exec;
+use crate::simd::dispatch;
+use repaint::Job;
+use resolve::Painter;
+use shares::Share;
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
+use tile::{Grid, TILE_SIDE, Tile};
+use transform::Vertices;
+use visible::Visible;
+
+/// Tells backends apart in the stamps of frames.
+static WRITERS: AtomicU64 = AtomicU64::new(0);
+
+/// The tiled software rasterizer: knows the owner of every pixel, and can illuminate every pixel.
+///
+/// Images are at most [`MAX_IMAGE_SIDE`](crate::geometry::screen::MAX_IMAGE_SIDE) pixels wide and high; what lies beyond is
+/// not drawn.
+pub struct SoftwareBackend {
+    writer: u64,
+    /// Counts the passes that may change colours.
+    serial: u64,
+    grid: Grid,
+    tiles: Vec<Tile>,
+    shares: Vec<Share>,
+    vertices: Vertices,
+    visible: Visible,
+    jobs: Vec<Job>,
+}
+
+impl fmt::Debug for SoftwareBackend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SoftwareBackend")
+            .field("writer", &self.writer)
+            .field("serial", &self.serial)
+            .field("grid", &self.grid)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Default for SoftwareBackend {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl SoftwareBackend {
+    /// A backend without an image.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            writer: WRITERS.fetch_add(1, Ordering::Relaxed),
+            serial: 0,
+            grid: Grid::default(),
+            tiles: Vec::new(),
+            shares: Vec::new(),
+            vertices: Vertices::default(),
+            visible: Visible::default(),
+            jobs: Vec::new(),
+        }
+    }
+
+    /// The owner of every pixel, row after row, [`NO_TRIANGLE`] where there is none; `out` is overwritten.
+    pub fn ids(&self, out: &mut Vec<u32>) {
+        self.copy_rows(|tile| &tile.id, out);
+    }
+
+    /// The reversed depth of every pixel, row after row, 0 where nothing is; `out` is overwritten.
+    pub fn depths(&self, out: &mut Vec<f32>) {
+        self.copy_rows(|tile| &tile.depth, out);
+        for depth in out {
+            *depth = depth.max(0.0);
+        }
+    }
+
+    fn copy_rows<T: Copy>(&self, plane: impl Fn(&Tile) -> &[T], out: &mut Vec<T>) {
+        out.clear();
+        for y in 0..self.grid.height as usize {
+            let first = y / TILE_SIDE * self.grid.columns;
+            for tile in &self.tiles[first..first + self.grid.columns] {
+                let start = y % TILE_SIDE * TILE_SIDE;
+                out.extend_from_slice(&plane(tile)[start..start + tile.width as usize]);
+            }
+        }
+    }
+
+    /// Makes room for a view's image.
+    fn fit(&mut self, geometry: Geometry<'_>) {
+        let grid = Grid::new(geometry.view.width, geometry.view.height);
+        if grid != self.grid {
+            self.serial += 1;
+            self.tiles = grid.tiles(self.serial);
+            self.grid = grid;
+        }
+    }
+
+    fn counts(&self) -> RasterCounts {
+        let mut counts = RasterCounts::default();
+        for share in &self.shares {
+            counts.submitted += share.counts.submitted;
+            counts.back_facing += share.counts.back_facing;
+            counts.off_screen += share.counts.off_screen;
+            counts.clipped += share.counts.clipped;
+            counts.drawn += share.counts.drawn;
+        }
+        for tile in &self.tiles {
+            counts.covered_pixels += u64::from(tile.covered);
+            counts.background_tiles += u64::from(tile.covered == 0);
+        }
+        counts
+    }
+}
+
+impl Backend for SoftwareBackend {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            ids: true,
+            per_pixel: true,
+        }
+    }
+
+    fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts {
+        self.fit(geometry);
+        let grid = self.grid;
+        shares::cut(&mut self.shares, geometry);
+        self.vertices.transform(exec, geometry, &mut self.shares);
+        let vertices = &self.vertices;
+        exec.for_each_chunk(&mut self.shares, 1, |_, share| {
+            setup::set_up(&mut share[0], geometry, grid, vertices);
+        });
+        let shares = &self.shares;
+        exec.for_each_chunk(&mut self.tiles, 1, |index, tile| {
+            dispatch!(exec.level, simd => raster::draw_tile(simd, &mut tile[0], index, shares));
+        });
+        self.visible.clear(geometry.world.triangles.len());
+        self.visible.count(&self.tiles);
+        self.visible.prepare(exec, geometry, grid, vertices);
+        self.counts()
+    }
+
+    fn visible_triangles(&self) -> &[u32] {
+        &self.visible.ids
+    }
+
+    fn visible_pixels(&self, triangle: u32) -> u32 {
+        self.visible.pixels(triangle)
+    }
+
+    fn resolve(&mut self, exec: Exec, geometry: Geometry<'_>, paint: BasePaint<'_>) {
+        self.serial += 1;
+        let painter = Painter {
+            geometry,
+            visible: &self.visible,
+            serial: self.serial,
+        };
+        exec.for_each_chunk(&mut self.tiles, 1, |_, tile| {
+            dispatch!(exec.level, simd => resolve::resolve_tile(simd, &mut tile[0], &painter, paint));
+        });
+    }
+
+    fn repaint(&mut self, exec: Exec, geometry: Geometry<'_>, patches: &mut [Patch]) {
+        self.serial += 1;
+        let painter = Painter {
+            geometry,
+            visible: &self.visible,
+            serial: self.serial,
+        };
+        repaint::plan(&mut self.jobs, &painter, self.grid, &self.vertices, patches);
+        repaint::run(exec, &mut self.tiles, &mut self.jobs, &painter, patches);
+        for patch in patches.iter_mut() {
+            patch.pixels = 0;
+        }
+        for job in &self.jobs {
+            patches[job.patch as usize].pixels += job.pixels;
+        }
+    }
+
+    fn present(&mut self, exec: Exec, frame: &mut Frame) -> u64 {
+        let now = Stamp {
+            writer: self.writer,
+            serial: self.serial,
+        };
+        present::present(exec, self.grid, &self.tiles, now, frame)
+    }
+}
