@@ -4,13 +4,13 @@
 //!
 //! | pass | over | does |
 //! |---|---|---|
-//! | [`transform`] | blocks of vertices | pixel space, clipping planes, sub-pixel grid |
-//! | [`setup`] | [`shares`] of triangles | culls, clips, plans depth, sorts into tiles |
-//! | [`raster`] | [tiles](tile) | coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them |
-//! | [`visible`] | tiles, then visible triangles | counts owners' pixels, prepares their barycentric planes |
-//! | [`resolve`] | tiles | colours |
-//! | [`repaint`] | tiles | colours of parts of triangles |
-//! | [`present`] | bands of tiles | copies changed tiles to a frame |
+//! | `transform` | blocks of vertices | pixel space, clipping planes, sub-pixel grid |
+//! | `setup` | `shares` of triangles | culls, clips, plans depth, sorts into tiles |
+//! | `raster` | tiles | coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them |
+//! | `visible` | tiles, then visible triangles | counts owners' pixels, prepares their barycentric planes |
+//! | `resolve` | tiles | colours |
+//! | `repaint` | tiles | colours of parts of triangles |
+//! | `present` | bands of tiles | copies changed tiles to a frame |
 //!
 //! No pass's result depends on the number of threads, nor coverage, depth and ids on the SIMD level. All memory is kept from
 //! image to image.

@@ -1,0 +1,130 @@
+//! Barycentric coordinates in lanes, and what is interpolated with them; shared by [`resolve`](super::resolve) and
+//! [`repaint`](super::repaint), so that both give a pixel the same bits.
+//!
+//! The lane form of [`Interpolator::at_pixel`]: `e_i = max(0, a_i dx + b_i dy + c_i)`, `w_i = e_i / (e_0 + e_1 + e_2)`. Where no
+//! edge plane is positive (a triangle seen edge-on; not a number) the weights are a third each. A sum below
+//! [`LEAST_SUM`] counts as zero, since its reciprocal might overflow; the coefficients are scaled to a largest of 1.
+
+use crate::geometry::Vec3s;
+use crate::geometry::screen::Interpolator;
+use crate::simd::Simd;
+use fearless_simd::{Select, SimdBase, SimdFloat, SimdInt};
+
+/// Sums of edge planes below this count as zero.
+const LEAST_SUM: f32 = 1e-30;
+
+/// Three values in lanes: a point, a vector, a colour or weights.
+pub(super) type Lanes3<S> = [<S as Simd>::f32s; 3];
+
+/// Three values of the three corners of a triangle.
+pub(super) type Corners3 = [[f32; 3]; 3];
+
+/// The corners' values of a vertex attribute.
+#[inline(always)]
+pub(super) fn gather(attribute: &Vec3s, triangle: [u32; 3]) -> Corners3 {
+    [
+        attribute.get(triangle[0] as usize),
+        attribute.get(triangle[1] as usize),
+        attribute.get(triangle[2] as usize),
+    ]
+}
+
+/// The same three values in all lanes.
+#[inline(always)]
+pub(super) fn splat3<S: Simd>(simd: S, v: [f32; 3]) -> Lanes3<S> {
+    [
+        S::f32s::splat(simd, v[0]),
+        S::f32s::splat(simd, v[1]),
+        S::f32s::splat(simd, v[2]),
+    ]
+}
+
+/// `mask ? a : b`.
+#[inline(always)]
+pub(super) fn select3<S: Simd>(mask: S::mask32s, a: Lanes3<S>, b: Lanes3<S>) -> Lanes3<S> {
+    [
+        mask.select(a[0], b[0]),
+        mask.select(a[1], b[1]),
+        mask.select(a[2], b[2]),
+    ]
+}
+
+/// The weights of a triangle's corners at consecutive pixels of a row, the first of them being `(x, y)` of the image.
+#[inline(always)]
+pub(super) fn weights<S: Simd>(simd: S, planes: &Interpolator, x: i32, y: i32) -> Lanes3<S> {
+    let iota = S::i32s::from_fn(simd, |i| i as i32);
+    let dx: S::f32s = (iota + (x - planes.anchor[0])).to_float();
+    let dy = S::f32s::splat(simd, (y - planes.anchor[1]) as f32);
+    let zero = S::f32s::splat(simd, 0.0);
+    let mut e = [zero; 3];
+    for (i, e) in e.iter_mut().enumerate() {
+        let [a, b, c] = splat3(simd, [planes.a[i], planes.b[i], planes.c[i]]);
+        let value = a.mul_add(dx, b.mul_add(dy, c));
+        // False for what is not a number.
+        *e = value.simd_gt(zero).select(value, zero);
+    }
+    let sum = e[0] + e[1] + e[2];
+    let usable = sum.simd_gt(S::f32s::splat(simd, LEAST_SUM));
+    let scale = S::f32s::splat(simd, 1.0) / sum;
+    let third = S::f32s::splat(simd, 1.0 / 3.0);
+    [
+        usable.select(e[0] * scale, third),
+        usable.select(e[1] * scale, third),
+        usable.select(e[2] * scale, third),
+    ]
+}
+
+/// The corners' values weighted.
+#[inline(always)]
+pub(super) fn interpolate<S: Simd>(simd: S, w: Lanes3<S>, corners: &Corners3) -> Lanes3<S> {
+    let mut out = w;
+    for (i, out) in out.iter_mut().enumerate() {
+        let [a, b, c] = splat3(simd, [corners[0][i], corners[1][i], corners[2][i]]);
+        *out = w[2].mul_add(c, w[1].mul_add(b, w[0] * a));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::screen::TrianglePlanes;
+    use crate::simd::{SimdLevel, dispatch};
+
+    #[inline(always)]
+    fn weights_at<S: Simd>(simd: S, planes: &Interpolator, x: i32, y: i32) -> Vec<[f32; 3]> {
+        let w = weights(simd, planes, x, y);
+        (0..S::f32s::LEN)
+            .map(|i| [w[0].as_slice()[i], w[1].as_slice()[i], w[2].as_slice()[i]])
+            .collect()
+    }
+
+    #[test]
+    fn lanes_agree_with_the_scalar_rule() {
+        let p = |x: f64, y: f64, w: f64| [x * w, y * w, 0.5 * w, w];
+        let ordinary = [p(3.2, 1.7, 1.0), p(90.4, 20.1, 4.0), p(7.9, 60.6, 2.5)];
+        let edge_on = [p(3.0, 3.0, 1.0), p(9.0, 9.0, 1.0), p(5.0, 5.0, 2.0)];
+        let behind = [p(3.2, 1.7, 1.0), p(90.4, 20.1, -4.0), p(7.9, 60.6, 2.5)];
+        let nan = Interpolator {
+            a: [f32::NAN; 3],
+            ..Interpolator::default()
+        };
+        let all = [ordinary, edge_on, behind]
+            .map(|t| TrianglePlanes::new(t).interpolator([3, 2]))
+            .into_iter()
+            .chain([nan]);
+        for planes in all {
+            for level in SimdLevel::available().filter_map(SimdLevel::token) {
+                for y in 0..64 {
+                    let got = dispatch!(level, simd => weights_at(simd, &planes, -4, y));
+                    for (x, got) in (-4..).zip(got) {
+                        let want = planes.at_pixel(x, y);
+                        for i in 0..3 {
+                            assert!((got[i] - want[i]).abs() < 1e-5, "{got:?} {want:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Copies of the image into frames.
+//!
+//! A frame says which writer filled it and when. Every tile knows when it changed last; so a frame of ours lacks
+//! exactly the tiles that changed after its stamp, and any other frame lacks all.
+
+use super::tile::{Grid, TILE_SIDE, Tile};
+use crate::output::Frame;
+use crate::output::frame::Stamp;
+use crate::parallel::Exec;
+
+/// Brings `frame` from its own state to that of `now`. Returns the number of pixels written.
+pub(super) fn present(
+    exec: Exec,
+    grid: Grid,
+    tiles: &[Tile],
+    now: Stamp,
+    frame: &mut Frame,
+) -> u64 {
+    if (frame.width(), frame.height()) != (grid.width, grid.height) {
+        return 0;
+    }
+    let known = frame
+        .stamp()
+        .filter(|stamp| stamp.writer == now.writer)
+        .map(|stamp| stamp.serial);
+    let stale = |tile: &&Tile| known.is_none_or(|serial| tile.serial > serial);
+    let written = tiles.iter().filter(stale).map(Tile::pixels).sum();
+    let pixels = frame.pixels_stamped(now);
+    if written > 0 {
+        let width = grid.width as usize;
+        exec.for_each_chunk(pixels, width * TILE_SIDE, |row, band| {
+            let first = row * grid.columns;
+            for tile in tiles[first..first + grid.columns].iter().filter(stale) {
+                copy_tile(tile, width, band);
+            }
+        });
+    }
+    written
+}
+
+/// Copies a tile into the rows of the frame that it takes part in.
+fn copy_tile(tile: &Tile, frame_width: usize, band: &mut [[u8; 4]]) {
+    let (left, width) = (tile.origin[0] as usize, tile.width as usize);
+    for (row, colors) in band
+        .chunks_mut(frame_width)
+        .zip(tile.color.chunks(TILE_SIDE))
+    {
+        for (pixel, color) in row[left..left + width].iter_mut().zip(colors) {
+            *pixel = color.to_le_bytes();
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! The image in tiles of 64 x 64 pixels, each a block of memory of its own.
+//!
+//! A pass hands every tile to exactly one thread as `&mut Tile`, so pixels need neither locks nor atomics and results
+//! cannot depend on how many threads there are. A tile's ids and depths (32 KiB) fit the first-level cache of
+//! current processors while its triangles are drawn. Rows are 64 pixels at every SIMD level, so that no vector of up to 16
+//! lanes, started at a multiple of its width, leaves its row. Tiles at the right and the bottom may hang over
+//! the image; their pixels outside never get a triangle.
+
+use crate::geometry::screen::MAX_IMAGE_SIDE;
+
+/// Width and height of a tile in pixels.
+pub(super) const TILE_SIDE: usize = 64;
+/// Pixels of a tile.
+pub(super) const TILE_PIXELS: usize = TILE_SIDE * TILE_SIDE;
+/// `log2` of [`TILE_SIDE`].
+const TILE_BITS: u32 = TILE_SIDE.trailing_zeros();
+
+/// The id of a pixel that no triangle covers.
+pub const NO_TRIANGLE: u32 = u32::MAX;
+
+/// The stored depth of a pixel that no triangle covers: behind everything, even the far plane (0), so that one comparison
+/// decides.
+pub(super) const NO_DEPTH: f32 = -1.0;
+
+/// Consecutive pixels of a tile with the same triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    /// The triangle.
+    pub id: u32,
+    /// How many pixels.
+    pub pixels: u32,
+}
+
+/// 64 x 64 pixels, rows from the top.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(super) struct Tile {
+    /// The triangle that owns each pixel, or [`NO_TRIANGLE`].
+    pub id: [u32; TILE_PIXELS],
+    /// Reversed depth of each pixel, or [`NO_DEPTH`].
+    pub depth: [f32; TILE_PIXELS],
+    /// Encoded colour of each pixel, RGBA from the lowest byte up.
+    pub color: [u32; TILE_PIXELS],
+    /// The image pixel in its top left corner.
+    pub origin: [i32; 2],
+    /// Columns inside the image.
+    pub width: i32,
+    /// Rows inside the image.
+    pub height: i32,
+    /// Pixels that have a triangle.
+    pub covered: u32,
+    /// The colour, if all of `color` is one colour because nothing was painted since it was filled.
+    pub filled: Option<u32>,
+    /// The backend's serial number when `color` changed last.
+    pub serial: u64,
+    /// Owners of the pixels in order, background left out.
+    pub runs: Vec<Run>,
+}
+
+impl Tile {
+    fn new(grid: Grid, index: usize, serial: u64) -> Self {
+        let (column, row) = (index % grid.columns, index / grid.columns);
+        let origin = [(column * TILE_SIDE) as i32, (row * TILE_SIDE) as i32];
+        let side = TILE_SIDE as i32;
+        Self {
+            id: [NO_TRIANGLE; TILE_PIXELS],
+            depth: [NO_DEPTH; TILE_PIXELS],
+            color: [0; TILE_PIXELS],
+            origin,
+            width: side.min(grid.width as i32 - origin[0]),
+            height: side.min(grid.height as i32 - origin[1]),
+            covered: 0,
+            filled: None,
+            serial,
+            runs: Vec::new(),
+        }
+    }
+
+    /// Takes all triangles off.
+    pub(super) fn clear(&mut self) {
+        self.id.fill(NO_TRIANGLE);
+        self.depth.fill(NO_DEPTH);
+    }
+
+    /// Pixels inside the image.
+    pub(super) fn pixels(&self) -> u64 {
+        self.width as u64 * self.height as u64
+    }
+}
+
+/// How an image is cut into tiles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Grid {
+    /// Image width in pixels.
+    pub width: u32,
+    /// Image height in pixels.
+    pub height: u32,
+    /// Tiles side by side.
+    pub columns: usize,
+    /// Tiles one above the other.
+    pub rows: usize,
+}
+
+impl Grid {
+    /// The grid of an image, whose sides are cut off at [`MAX_IMAGE_SIDE`].
+    pub(super) fn new(width: u32, height: u32) -> Self {
+        let (width, height) = (width.min(MAX_IMAGE_SIDE), height.min(MAX_IMAGE_SIDE));
+        Self {
+            width,
+            height,
+            columns: (width as usize).div_ceil(TILE_SIDE),
+            rows: (height as usize).div_ceil(TILE_SIDE),
+        }
+    }
+
+    /// Number of tiles.
+    pub(super) fn len(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// Empty tiles for the whole image.
+    pub(super) fn tiles(self, serial: u64) -> Vec<Tile> {
+        (0..self.len())
+            .map(|index| Tile::new(self, index, serial))
+            .collect()
+    }
+
+    /// Indices of the tiles that a box of pixels touches, row by row.
+    #[inline]
+    pub(super) fn touched(self, b: &Bounds) -> impl Iterator<Item = usize> + use<> {
+        let [x0, y0, x1, y1] = [b.x0, b.y0, b.x1, b.y1].map(|v| usize::from(v >> TILE_BITS));
+        (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| y * self.columns + x))
+    }
+}
+
+/// An inclusive range of pixels of the image, in half the memory of a `PixelBox`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Bounds {
+    /// First column.
+    pub x0: u16,
+    /// First row.
+    pub y0: u16,
+    /// Last column.
+    pub x1: u16,
+    /// Last row.
+    pub y1: u16,
+}
+
+impl From<crate::geometry::screen::PixelBox> for Bounds {
+    fn from(b: crate::geometry::screen::PixelBox) -> Self {
+        // Pixel boxes lie inside the image, whose sides fit 16 bits.
+        let [x0, y0, x1, y1] = [b.x0, b.y0, b.x1, b.y1].map(|v| v as u16);
+        Self { x0, y0, x1, y1 }
+    }
+}
+
+impl Bounds {
+    /// The top left pixel.
+    pub(super) fn anchor(&self) -> [i32; 2] {
+        [i32::from(self.x0), i32::from(self.y0)]
+    }
+
+    /// The pixels inside a tile, counted from its corner; it must be one that the box touches.
+    #[inline(always)]
+    pub(super) fn within(&self, origin: [i32; 2]) -> TileBox {
+        let last = TILE_SIDE as i32 - 1;
+        TileBox {
+            x0: (i32::from(self.x0) - origin[0]).max(0),
+            y0: (i32::from(self.y0) - origin[1]).max(0),
+            x1: (i32::from(self.x1) - origin[0]).min(last),
+            y1: (i32::from(self.y1) - origin[1]).min(last),
+        }
+    }
+}
+
+/// An inclusive range of pixels of a tile, counted from the tile's corner.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TileBox {
+    /// First column.
+    pub x0: i32,
+    /// First row.
+    pub y0: i32,
+    /// Last column.
+    pub x1: i32,
+    /// Last row.
+    pub y1: i32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_the_image_and_border_tiles_hang_over() {
+        let grid = Grid::new(130, 64);
+        let tiles = grid.tiles(0);
+        assert_eq!((grid.columns, grid.rows, tiles.len()), (3, 1, 3));
+        assert_eq!(tiles.iter().map(Tile::pixels).sum::<u64>(), 130 * 64);
+        assert_eq!((tiles[2].origin, tiles[2].width), ([128, 0], 2));
+        assert_eq!(Grid::new(0, 10).len(), 0);
+    }
+
+    #[test]
+    fn a_box_touches_the_tiles_it_overlaps() {
+        let grid = Grid::new(300, 200);
+        let b = Bounds {
+            x0: 63,
+            y0: 64,
+            x1: 128,
+            y1: 127,
+        };
+        assert_eq!(grid.touched(&b).collect::<Vec<_>>(), [5, 6, 7]);
+        let inside = b.within([64, 64]);
+        assert_eq!([inside.x0, inside.y0, inside.x1, inside.y1], [0, 0, 63, 63]);
+    }
+}
