@@ -21,3 +21,8 @@ pub mod scene;
 pub mod schedule;
 pub mod simd;
 pub mod visibility;
+
+pub use frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
+pub use output::Frame;
+pub use scene::Scene;
+pub use schedule::Budget;

@@ -1,7 +1,14 @@
 //! The engine: the one place that knows all stages.
+//!
+//! [`Engine::render`] is the frame loop. Read it first; it says what happens in a frame and in which order. [`base`] draws
+//! the first image, [`refinement`] makes it better.
 
+mod base;
+mod engine;
 mod method;
+mod refinement;
 mod stats;
 
+pub use engine::{Engine, EngineError, EngineOptions};
 pub use method::Method;
 pub use stats::{FrameStats, Outcome, Skipped, StageTimes};

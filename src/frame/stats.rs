@@ -121,8 +121,10 @@ pub struct FrameStats {
     pub triangles_drawn: u64,
     /// Triangles that own at least one pixel.
     pub triangles_visible: u64,
-    /// Triangles that pass the paper's H1 and H2 tests for some light, among those drawn with visible pixels or hidden
-    /// by others.
+    /// Pixels that some triangle owns.
+    pub covered_pixels: u64,
+    /// Potentially highlighted triangles: those that pass the paper's H1 and H2 tests for some light, in all clusters that
+    /// were not culled. Not counted by methods that draw one image and are done.
     pub pht: u64,
     /// Those of them that own at least one pixel.
     pub pht_visible: u64,
@@ -145,6 +147,32 @@ pub struct FrameStats {
 }
 
 impl FrameStats {
+    /// A frame in which nothing happened.
+    pub(super) fn empty(budget: Budget) -> Self {
+        Self {
+            frame: 0,
+            frame_ms: 0.0,
+            budget,
+            outcome: Outcome::BaseOnly,
+            converged: false,
+            estimated_error: f64::NAN,
+            triangles: 0,
+            triangles_drawn: 0,
+            triangles_visible: 0,
+            covered_pixels: 0,
+            pht: 0,
+            pht_visible: 0,
+            refined: 0,
+            triangles_subdivided: 0,
+            leaves: 0,
+            phong_pixels: 0,
+            work_units: 0,
+            pixels_written: 0,
+            stage_ms: StageTimes::default(),
+            skipped: Skipped::default(),
+        }
+    }
+
     /// Milliseconds past the deadline; negative when the frame was early, `None` without a wall-clock budget.
     #[must_use]
     pub fn overshoot_ms(&self) -> Option<f64> {

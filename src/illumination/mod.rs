@@ -10,4 +10,4 @@ pub mod reference;
 pub use batch::{shade_points, shade_vertices};
 pub use lanes::{ShadingKit, shade_lanes};
 pub use lights::{ActiveLights, LightMask, MAX_LIGHTS};
-pub use points::PointBatch;
+pub use points::{PointBatch, shade_corners};

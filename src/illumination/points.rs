@@ -1,11 +1,13 @@
 //! Points of mixed materials, collected and then illuminated together.
 
 use super::batch::shade_points;
-use super::lanes::ShadingKit;
+use super::lanes::{ShadingKit, shade_lanes};
 use super::lights::ActiveLights;
 use crate::geometry::Vec3s;
 use crate::parallel::Exec;
 use crate::scene::{Eye, World};
+use crate::simd::{Level, Simd, dispatch};
+use fearless_simd::prelude::*;
 
 /// Points in a chunk: enough to amortize a dispatch, few enough to share among threads.
 const CHUNK: usize = 256;
@@ -114,6 +116,41 @@ impl PointBatch {
         let place = self.places[index] as usize;
         self.chunks[place / CHUNK].colours.get(place % CHUNK)
     }
+}
+
+/// Linear colours of a triangle's corners under some of the lights.
+#[must_use]
+pub fn shade_corners(
+    level: Level,
+    kit: &ShadingKit<'_>,
+    active: &ActiveLights,
+    points: [[f32; 3]; 3],
+    normals: [[f32; 3]; 3],
+) -> [[f32; 3]; 3] {
+    dispatch!(level, simd => shade_corners_lanes(simd, kit, active, points, normals))
+}
+
+#[inline(always)]
+fn shade_corners_lanes<S: Simd>(
+    simd: S,
+    kit: &ShadingKit<'_>,
+    active: &ActiveLights,
+    points: [[f32; 3]; 3],
+    normals: [[f32; 3]; 3],
+) -> [[f32; 3]; 3] {
+    let (points, normals) = (corner_lanes(simd, points), corner_lanes(simd, normals));
+    let [r, g, b] = shade_lanes(simd, kit, active, points, normals);
+    [[r[0], g[0], b[0]], [r[1], g[1], b[1]], [r[2], g[2], b[2]]]
+}
+
+/// Three vectors in lanes; spare lanes repeat the last.
+#[inline(always)]
+fn corner_lanes<S: Simd>(simd: S, v: [[f32; 3]; 3]) -> [S::f32s; 3] {
+    [
+        S::f32s::from_fn(simd, |lane| v[lane.min(2)][0]),
+        S::f32s::from_fn(simd, |lane| v[lane.min(2)][1]),
+        S::f32s::from_fn(simd, |lane| v[lane.min(2)][2]),
+    ]
 }
 
 #[cfg(test)]

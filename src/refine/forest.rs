@@ -105,6 +105,12 @@ impl Forest {
         &self.leaves[id as usize]
     }
 
+    /// Whether the leaf takes part in a split that has been planned and not concluded: it must be left alone until then.
+    #[must_use]
+    pub fn is_in_plan(&self, id: LeafId) -> bool {
+        self.leaves[id as usize].busy
+    }
+
     /// Leaves that are neither closed nor split.
     #[must_use]
     pub fn open_leaves(&self) -> usize {
@@ -186,6 +192,7 @@ impl Forest {
 
     /// Notes that the leaf's pixels are right: it has been shaded per pixel, has none, or is proved right as it is.
     pub fn close(&mut self, world: &World, id: LeafId) {
+        debug_assert!(!self.is_in_plan(id), "leaf {id} is about to be split");
         self.retire(world, id, LeafState::Closed);
         self.leaves[id as usize].error = 0.0;
     }

@@ -1,0 +1,249 @@
+//! The first image of a view: visibility, then illumination of what is visible, then colour.
+
+use super::Method;
+use super::stats::FrameStats;
+use crate::backend::{Backend, BasePaint, Geometry, RasterCounts};
+use crate::geometry::Vec3s;
+use crate::highlight::{self, SignBits};
+use crate::illumination::PointBatch;
+use crate::parallel::Exec;
+use crate::scene::{View, World};
+use crate::visibility::{CullCounts, Culler};
+use std::ops::Range;
+
+/// The first image of a view, and what was learned while drawing it.
+#[derive(Debug)]
+pub(super) struct BaseImage {
+    culler: Culler,
+    visible: Vec<Range<u32>>,
+    /// Linear colours: of vertices, or of triangles if shading is flat. Those of visible triangles are valid.
+    colours: Vec3s,
+    signs: SignBits,
+    batch: PointBatch,
+    vertices: Vec<u32>,
+    /// The image for which a vertex was last put on a list.
+    stamp: Vec<u32>,
+    image: u32,
+    culled: CullCounts,
+    raster: RasterCounts,
+    /// Triangles that own a pixel.
+    visible_triangles: u64,
+    pht: u64,
+    pht_visible: u64,
+    matte_visible: u64,
+}
+
+impl BaseImage {
+    pub(super) fn new(world: &World) -> Self {
+        let two_sided = |first: u32| {
+            let material = world.triangle_material[first as usize];
+            world.materials[usize::from(material)].two_sided
+        };
+        let sides: Vec<bool> = world
+            .clusters
+            .iter()
+            .map(|cluster| two_sided(cluster.triangles.start))
+            .collect();
+        Self {
+            culler: Culler::new(&world.clusters, &sides),
+            visible: Vec::new(),
+            colours: Vec3s::default(),
+            signs: SignBits::default(),
+            batch: PointBatch::default(),
+            vertices: Vec::new(),
+            stamp: vec![0; world.positions.len()],
+            image: 0,
+            culled: CullCounts::default(),
+            raster: RasterCounts::default(),
+            visible_triangles: 0,
+            pht: 0,
+            pht_visible: 0,
+            matte_visible: 0,
+        }
+    }
+
+    /// What there is to draw of the view last culled.
+    pub(super) fn geometry<'a>(&'a self, world: &'a World, view: &'a View) -> Geometry<'a> {
+        Geometry {
+            world,
+            view,
+            visible: &self.visible,
+        }
+    }
+
+    /// Linear colours of the vertices of visible triangles.
+    pub(super) fn colours(&self) -> &Vec3s {
+        &self.colours
+    }
+
+    /// Whether the triangle passes the paper's test for some light.
+    pub(super) fn is_pht(&self, world: &World, triangle: u32) -> bool {
+        let corners = world.triangles[triangle as usize];
+        !self.signs.pht_lights(corners).is_empty()
+    }
+
+    pub(super) fn cull(&mut self, view: &View) {
+        self.culled = self.culler.cull(view, &mut self.visible);
+    }
+
+    pub(super) fn rasterize(
+        &mut self,
+        exec: Exec,
+        world: &World,
+        view: &View,
+        backend: &mut dyn Backend,
+    ) {
+        self.raster = backend.rasterize(exec, self.geometry(world, view));
+        self.visible_triangles = backend.visible_triangles().len() as u64;
+    }
+
+    /// Illuminates what the method needs for its first image.
+    pub(super) fn shade(
+        &mut self,
+        exec: Exec,
+        method: Method,
+        world: &World,
+        view: &View,
+        backend: &dyn Backend,
+    ) {
+        match method {
+            Method::Phong => {}
+            Method::Flat => self.shade_triangles(exec, world, view, backend),
+            _ => self.shade_vertices(exec, world, view, backend),
+        }
+    }
+
+    fn shade_vertices(&mut self, exec: Exec, world: &World, view: &View, backend: &dyn Backend) {
+        self.list_vertices(world, backend.visible_triangles().iter().copied());
+        self.batch.clear();
+        for &vertex in &self.vertices {
+            let v = vertex as usize;
+            let (point, normal) = (world.positions.get(v), world.normals.get(v));
+            self.batch.push(point, normal, world.vertex_material[v]);
+        }
+        self.batch.illuminate(exec, world, view.eye);
+        self.colours.resize(world.positions.len());
+        for (index, &vertex) in self.vertices.iter().enumerate() {
+            self.colours.set(vertex as usize, self.batch.colour(index));
+        }
+    }
+
+    /// One colour per triangle, at its centroid with its geometric normal.
+    fn shade_triangles(&mut self, exec: Exec, world: &World, view: &View, backend: &dyn Backend) {
+        self.batch.clear();
+        for &triangle in backend.visible_triangles() {
+            let corners = world.triangles[triangle as usize].map(|v| {
+                let p = world.positions.get(v as usize);
+                glam::Vec3::from(p)
+            });
+            let centroid = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            let material = world.triangle_material[triangle as usize];
+            // Scaled up, because the cross product of a small triangle's edges may be too short to normalize.
+            self.batch.push(
+                centroid.to_array(),
+                normal.normalize_or_zero().to_array(),
+                material,
+            );
+        }
+        self.batch.illuminate(exec, world, view.eye);
+        self.colours.resize(world.triangles.len());
+        for (index, &triangle) in backend.visible_triangles().iter().enumerate() {
+            self.colours
+                .set(triangle as usize, self.batch.colour(index));
+        }
+    }
+
+    /// Puts the vertices of some triangles on the list, each once, in order of first use.
+    fn list_vertices(&mut self, world: &World, triangles: impl Iterator<Item = u32>) {
+        self.image = match self.image.checked_add(1) {
+            Some(image) => image,
+            None => {
+                self.stamp.fill(0);
+                1
+            }
+        };
+        self.vertices.clear();
+        for triangle in triangles {
+            for vertex in world.triangles[triangle as usize] {
+                let stamp = &mut self.stamp[vertex as usize];
+                if *stamp != self.image {
+                    *stamp = self.image;
+                    self.vertices.push(vertex);
+                }
+            }
+        }
+    }
+
+    pub(super) fn resolve(
+        &mut self,
+        exec: Exec,
+        method: Method,
+        world: &World,
+        view: &View,
+        backend: &mut dyn Backend,
+    ) {
+        let paint = match method {
+            Method::Phong => BasePaint::Phong,
+            Method::Flat => BasePaint::Flat(&self.colours),
+            _ => BasePaint::Gouraud(&self.colours),
+        };
+        backend.resolve(exec, self.geometry(world, view), paint);
+    }
+
+    /// The paper's sign tests at the vertices of everything that was handed to the rasterizer, and a count of the
+    /// triangles that pass them.
+    pub(super) fn classify(
+        &mut self,
+        exec: Exec,
+        world: &World,
+        view: &View,
+        backend: &dyn Backend,
+    ) {
+        let visible = std::mem::take(&mut self.visible);
+        let is_specular = |triangle: u32| {
+            let material = world.triangle_material[triangle as usize];
+            world.materials[usize::from(material)].is_specular()
+        };
+        let tested = || {
+            visible
+                .iter()
+                .cloned()
+                .flatten()
+                .filter(|&t| is_specular(t))
+        };
+        self.list_vertices(world, tested());
+        self.signs.resize(world);
+        highlight::compute_signs(exec.level, world, view.eye, &self.vertices, &mut self.signs);
+        (self.pht, self.pht_visible) = (0, 0);
+        for triangle in tested() {
+            if self.is_pht(world, triangle) {
+                self.pht += 1;
+                self.pht_visible += u64::from(backend.visible_pixels(triangle) > 0);
+            }
+        }
+        self.matte_visible = backend
+            .visible_triangles()
+            .iter()
+            .filter(|&&t| !is_specular(t))
+            .count() as u64;
+        self.visible = visible;
+    }
+
+    /// Fills in what the first image had to do and what it did not.
+    pub(super) fn report(&self, stats: &mut FrameStats) {
+        stats.triangles_drawn = self.raster.drawn;
+        stats.triangles_visible = self.visible_triangles;
+        stats.covered_pixels = self.raster.covered_pixels;
+        stats.pht = self.pht;
+        stats.pht_visible = self.pht_visible;
+        let skipped = &mut stats.skipped;
+        skipped.clusters_off_screen = u64::from(self.culled.outside_frustum);
+        skipped.clusters_facing_away = u64::from(self.culled.facing_away);
+        skipped.triangles_facing_away = self.raster.back_facing;
+        skipped.triangles_off_screen = self.raster.off_screen;
+        skipped.triangles_hidden = self.raster.drawn.saturating_sub(self.visible_triangles);
+        skipped.triangles_matte = self.matte_visible;
+        skipped.background_tiles = self.raster.background_tiles;
+    }
+}

@@ -1,0 +1,309 @@
+//! The frame loop.
+
+use super::Method;
+use super::base::BaseImage;
+use super::refinement::Refinement;
+use super::stats::{FrameStats, Outcome, StageTimes};
+use crate::backend::Backend;
+use crate::backend::software::SoftwareBackend;
+use crate::clock::{Clock, SystemClock};
+use crate::output::Frame;
+use crate::parallel::Exec;
+use crate::scene::{Scene, View, World};
+use crate::schedule::{Allowance, Budget, cost};
+use crate::simd::SimdLevel;
+use std::sync::Arc;
+
+/// How an engine runs.
+#[derive(Clone, Debug)]
+pub struct EngineOptions {
+    /// How images are shaded.
+    pub method: Method,
+    /// Threads to use; `None` for as many as the machine has processors. With one, everything happens on the caller's
+    /// thread; with more, the engine owns a pool.
+    pub threads: Option<usize>,
+    /// SIMD level to use; `None` for the machine's strongest.
+    pub simd: Option<SimdLevel>,
+    /// Where time comes from.
+    pub clock: Arc<dyn Clock>,
+}
+
+impl Default for EngineOptions {
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            threads: None,
+            simd: None,
+            clock: Arc::new(SystemClock::new()),
+        }
+    }
+}
+
+/// Why an engine cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EngineError {
+    /// Zero threads were asked for.
+    #[error("an engine needs at least one thread")]
+    NoThreads,
+    /// The SIMD level asked for is not one of this machine's.
+    #[error("this machine does not have the SIMD level '{0}'")]
+    NoSuchSimdLevel(SimdLevel),
+    /// The threads could not be started.
+    #[error("cannot start {threads} threads: {source}")]
+    ThreadPool {
+        /// How many.
+        threads: usize,
+        /// What the operating system says.
+        source: rayon::ThreadPoolBuildError,
+    },
+}
+
+/// Renders a scene, frame after frame, each within a budget.
+///
+/// ```
+/// use specula::{Budget, Engine, Frame, Scene};
+///
+/// let scene = Scene::parse("(objects: [(shape: Teapot())])", "teapot.ron")?;
+/// let mut engine = Engine::new(&scene)?;
+/// let mut frame = Frame::new(320, 180);
+/// for _ in 0..4 {
+///     let stats = engine.render(&scene, Budget::from_millis(2.0), &mut frame);
+///     println!("{stats}");
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Engine {
+    clock: Arc<dyn Clock>,
+    exec: Exec,
+    pool: Option<rayon::ThreadPool>,
+    renderer: Renderer,
+}
+
+/// Everything of an engine that a frame changes.
+#[derive(Debug)]
+struct Renderer {
+    method: Method,
+    scene_id: u64,
+    world: World,
+    backend: Box<dyn Backend>,
+    /// The view that the image in the backend shows, if it shows any.
+    shown: Option<View>,
+    base: BaseImage,
+    refinement: Refinement,
+    frames: u64,
+}
+
+impl Engine {
+    /// An engine with default options, made ready for `scene`: vertices welded, clusters and bounding volumes built.
+    ///
+    /// # Errors
+    /// When the threads cannot be started.
+    pub fn new(scene: &Scene) -> Result<Self, EngineError> {
+        Self::with_options(scene, EngineOptions::default())
+    }
+
+    /// An engine with the given options.
+    ///
+    /// # Errors
+    /// When there are to be no threads, they cannot be started, or the machine lacks the SIMD level.
+    pub fn with_options(scene: &Scene, options: EngineOptions) -> Result<Self, EngineError> {
+        let simd = options.simd.unwrap_or_else(SimdLevel::detect);
+        let level = simd.token().ok_or(EngineError::NoSuchSimdLevel(simd))?;
+        let threads = options.threads.unwrap_or_else(|| {
+            std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+        });
+        let pool = match threads {
+            0 => return Err(EngineError::NoThreads),
+            1 => None,
+            _ => Some(
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .thread_name(|index| format!("specula-{index}"))
+                    .build()
+                    .map_err(|source| EngineError::ThreadPool { threads, source })?,
+            ),
+        };
+        let world = World::new(scene);
+        Ok(Self {
+            clock: options.clock,
+            exec: Exec { level, threads },
+            pool,
+            renderer: Renderer {
+                method: options.method,
+                scene_id: scene.id(),
+                base: BaseImage::new(&world),
+                world,
+                backend: Box::new(SoftwareBackend::new()),
+                shown: None,
+                refinement: Refinement::default(),
+                frames: 0,
+            },
+        })
+    }
+
+    /// Renders the scene from its camera into `frame`, within `budget`.
+    ///
+    /// A still view is refined further from frame to frame, until it equals per-pixel Phong shading; then nothing is
+    /// drawn any more. A changed scene, view or image size starts anew.
+    ///
+    /// It never fails: a scene is validated when it is made.
+    pub fn render(&mut self, scene: &Scene, budget: Budget, frame: &mut Frame) -> FrameStats {
+        let allowance = Allowance::new(budget, &*self.clock, self.clock.now_ms());
+        let (renderer, exec) = (&mut self.renderer, self.exec);
+        match &self.pool {
+            Some(pool) => pool.install(|| renderer.render(exec, scene, budget, allowance, frame)),
+            None => renderer.render(exec, scene, budget, allowance, frame),
+        }
+    }
+
+    /// Forgets the current image, so that the next frame starts cold. Memory stays allocated and threads stay awake.
+    pub fn forget(&mut self) {
+        self.renderer.shown = None;
+    }
+
+    /// The scene as it is rendered.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.renderer.world
+    }
+
+    /// Threads that the engine uses.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.exec.threads
+    }
+}
+
+impl Renderer {
+    /// One frame: draw the first image if there is none, refine it while the budget lasts, hand it over.
+    fn render(
+        &mut self,
+        exec: Exec,
+        scene: &Scene,
+        budget: Budget,
+        mut allowance: Allowance<'_>,
+        frame: &mut Frame,
+    ) -> FrameStats {
+        let mut stages = StageTimes::default();
+        self.adopt(scene);
+        let view = self
+            .world
+            .view(&scene.camera, frame.width(), frame.height());
+
+        let is_new = self.shown != Some(view);
+        if is_new {
+            self.draw_base(exec, &view, &allowance, &mut stages);
+        }
+
+        let refining_since = allowance.elapsed_ms();
+        if self.method.is_progressive() {
+            self.refine(exec, &view, &mut allowance);
+        }
+        let presenting_since = allowance.elapsed_ms();
+        stages.refine += presenting_since - refining_since;
+
+        let pixels_written = self.backend.present(exec, frame);
+        let frame_ms = allowance.elapsed_ms();
+        stages.resolve += frame_ms - presenting_since;
+
+        let converged = !self.method.is_progressive() || self.refinement.is_finished();
+        let mut stats = FrameStats {
+            frame: self.frames,
+            frame_ms,
+            outcome: match (converged, is_new, allowance.spent_units()) {
+                (true, false, 0) => Outcome::Unchanged,
+                (true, ..) => Outcome::Complete,
+                (false, _, 0) => Outcome::BaseOnly,
+                (false, ..) => Outcome::Refined,
+            },
+            converged,
+            triangles: self.world.triangles.len() as u64,
+            work_units: allowance.spent_units(),
+            pixels_written,
+            stage_ms: stages,
+            ..FrameStats::empty(budget)
+        };
+        self.base.report(&mut stats);
+        self.refinement.report(self.method, &mut stats);
+        stats.skipped.pixels_unchanged =
+            u64::from(frame.width()) * u64::from(frame.height()) - pixels_written;
+        self.frames += 1;
+        stats
+    }
+
+    /// Makes the world anew when the scene is another one or has changed.
+    fn adopt(&mut self, scene: &Scene) {
+        if scene.id() != self.scene_id {
+            self.world = World::new(scene);
+            self.base = BaseImage::new(&self.world);
+            self.scene_id = scene.id();
+            self.shown = None;
+        }
+    }
+
+    /// Draws the first image of a view, and makes the list of what could be refined.
+    fn draw_base(
+        &mut self,
+        exec: Exec,
+        view: &View,
+        allowance: &Allowance<'_>,
+        stages: &mut StageTimes,
+    ) {
+        let backend = &mut *self.backend;
+        let mut since = allowance.elapsed_ms();
+        let mut lap = |stage: &mut f64| {
+            let now = allowance.elapsed_ms();
+            *stage += now - since;
+            since = now;
+        };
+
+        // Which clusters can be seen at all?
+        self.base.cull(view);
+        lap(&mut stages.cull);
+
+        // Who owns which pixel?
+        self.base.rasterize(exec, &self.world, view, backend);
+        lap(&mut stages.raster);
+
+        // Only vertices of triangles that own a pixel are illuminated.
+        self.base
+            .shade(exec, self.method, &self.world, view, backend);
+        lap(&mut stages.shade);
+
+        self.base
+            .resolve(exec, self.method, &self.world, view, backend);
+        lap(&mut stages.resolve);
+
+        // Which triangles can hold a highlight, and what is worth refining?
+        if self.method.is_progressive() {
+            self.base.classify(exec, &self.world, view, backend);
+            self.refinement
+                .collect_candidates(self.method, &self.world, &self.base, backend);
+        } else {
+            self.refinement.clear();
+        }
+        lap(&mut stages.classify);
+
+        self.shown = Some(*view);
+    }
+
+    /// Spends what is left of the budget, less what handing the image over will take.
+    fn refine(&mut self, exec: Exec, view: &View, allowance: &mut Allowance<'_>) {
+        let mut stage = super::refinement::Stage {
+            exec,
+            world: &self.world,
+            view,
+            base: &self.base,
+            backend: &mut *self.backend,
+        };
+        loop {
+            let pending = stage.backend.pending_pixels();
+            allowance.reserve_ms(f64::from(cost::present(pending)) * 1e-6);
+            if !self.refinement.step(&mut stage, allowance) {
+                break;
+            }
+        }
+    }
+}

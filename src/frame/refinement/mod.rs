@@ -1,0 +1,251 @@
+//! Refinement: what could be done next, what it is worth, and doing it piece by piece.
+//!
+//! Work comes in two kinds of pieces, each about [`PIECE_UNITS`] long, between which the clock is looked at:
+//!
+//! * A **planning** piece takes the best candidates off the queue. A triangle not looked at yet becomes the root of a
+//!   subdivision, its error estimated from samples; a leaf is split further, or is to be shaded per pixel, whichever
+//!   takes away more error per nominal cost. All new vertices of the piece are illuminated together. What comes out is
+//!   a list of patches to paint.
+//! * A **painting** piece paints patches off that list, in order. Large areas have been cut into patches that each take
+//!   a fraction of a piece. The list survives the end of a frame; planning goes on when it is empty.
+//!
+//! Plans depend on nominal costs and estimates only, and patches are painted in list order until the budget ends, so
+//! that a budget in work units gives the same image for any number of threads.
+
+mod painting;
+mod planning;
+mod ranking;
+
+use super::Method;
+use super::base::BaseImage;
+use super::stats::FrameStats;
+use crate::backend::{Backend, Patch};
+use crate::illumination::ActiveLights;
+use crate::parallel::Exec;
+use crate::refine::{Forest, LeafId, SplitOutcome};
+use crate::scene::{View, World};
+use crate::schedule::{Allowance, RankedQueue};
+use std::collections::VecDeque;
+
+/// Nominal nanoseconds between two looks at the clock.
+const PIECE_UNITS: u64 = 50_000;
+
+/// What the stages of refinement work on.
+pub(super) struct Stage<'a> {
+    pub(super) exec: Exec,
+    pub(super) world: &'a World,
+    pub(super) view: &'a View,
+    pub(super) base: &'a BaseImage,
+    pub(super) backend: &'a mut dyn Backend,
+}
+
+/// Something that could be refined.
+#[derive(Clone, Copy, Debug)]
+enum Candidate {
+    /// A visible triangle, by its place in [`Refinement::roots`].
+    Root(u32),
+    /// A leaf of the forest.
+    Leaf(LeafId),
+}
+
+/// A visible triangle.
+#[derive(Clone, Copy, Debug)]
+struct Root {
+    triangle: u32,
+    pixels: u32,
+    /// Mean squared error, guessed before anything was looked at.
+    prior: f32,
+    is_pht: bool,
+    progress: Progress,
+    /// Subdivided.
+    is_split: bool,
+    /// Subdivided, or shaded per pixel in part or as a whole.
+    is_refined: bool,
+    /// How its pixels are shaded, once that has been asked.
+    shading: Option<Shading>,
+}
+
+/// How far a root has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    /// Not looked at.
+    Waiting,
+    /// The forest knows about it.
+    Planted,
+    /// Its pixels are right.
+    Done,
+}
+
+/// Which terms have to be evaluated at the pixels of a root.
+#[derive(Clone, Copy, Debug)]
+enum Shading {
+    /// None: interpolation is proved to be right.
+    Proved,
+    /// These, plus the rest, interpolated between the triangle's corners.
+    PerPixel(ActiveLights, [[f32; 3]; 3]),
+}
+
+/// Whose pixels a patch belongs to.
+#[derive(Clone, Copy, Debug)]
+enum Owner {
+    /// A root that is shaded as a whole.
+    Root,
+    Leaf(LeafId),
+}
+
+/// A patch waiting to be painted.
+#[derive(Clone, Copy, Debug)]
+struct Paint {
+    patch: Patch,
+    owner: Owner,
+    units: u32,
+}
+
+/// A leaf's patches that are still to be painted, and its pixels counted so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Progressing {
+    patches: u32,
+    pixels: u32,
+}
+
+/// All refinement of the current image.
+#[derive(Debug, Default)]
+pub(super) struct Refinement {
+    forest: Forest,
+    queue: RankedQueue<Candidate>,
+    roots: Vec<Root>,
+    /// Place of a triangle in `roots`, for visible ones.
+    root_of_triangle: Vec<u32>,
+    paints: VecDeque<Paint>,
+    /// Triangles are shaded per pixel in the order of their area ([`Method::PhongArea`]).
+    by_area: bool,
+    /// By leaf.
+    progressing: Vec<Progressing>,
+    /// Expected sum of squared errors over all covered pixels, per channel, in squared codes.
+    error_mass: f64,
+    counters: Counters,
+    // Workspaces of a piece.
+    piece: Vec<Patch>,
+    owners: Vec<Owner>,
+    planted: Vec<LeafId>,
+    splits: Vec<SplitOutcome>,
+    deferred: Vec<Candidate>,
+}
+
+/// What refinement has come to for the current image.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counters {
+    refined_phts: u64,
+    subdivided: u64,
+    phong_pixels: u64,
+    proved: u64,
+    light_terms: u64,
+}
+
+impl Refinement {
+    /// Forgets everything and keeps the memory.
+    pub(super) fn clear(&mut self) {
+        self.queue.clear();
+        self.roots.clear();
+        self.paints.clear();
+        self.progressing.clear();
+        self.error_mass = 0.0;
+        self.counters = Counters::default();
+    }
+
+    /// Whether there is nothing left to refine.
+    pub(super) fn is_finished(&self) -> bool {
+        self.queue.is_empty() && self.paints.is_empty()
+    }
+
+    /// Makes every visible triangle of a new image a candidate.
+    pub(super) fn collect_candidates(
+        &mut self,
+        method: Method,
+        world: &World,
+        base: &BaseImage,
+        backend: &dyn Backend,
+    ) {
+        self.clear();
+        self.forest.reset(world);
+        self.root_of_triangle
+            .resize(world.triangles.len(), u32::MAX);
+        // The rival knows areas only: no estimates, no bounds, no subdivision.
+        self.by_area = method == Method::PhongArea;
+        let shading = self.by_area.then(|| {
+            let all = ActiveLights::all(world.lights.len());
+            Shading::PerPixel(all, [[0.0; 3]; 3])
+        });
+        for (index, &triangle) in backend.visible_triangles().iter().enumerate() {
+            let pixels = backend.visible_pixels(triangle);
+            let is_pht = base.is_pht(world, triangle);
+            let prior = ranking::prior_error(world, base.colours(), triangle, is_pht);
+            let root = Root {
+                triangle,
+                pixels,
+                prior,
+                is_pht,
+                progress: Progress::Waiting,
+                is_split: false,
+                is_refined: false,
+                shading,
+            };
+            self.root_of_triangle[triangle as usize] = index as u32;
+            self.roots.push(root);
+            self.error_mass += f64::from(pixels) * f64::from(prior);
+            let rank = self.rank_root(&root, world.lights.len());
+            self.queue.push(rank, Candidate::Root(index as u32));
+        }
+    }
+
+    /// Does one piece of work. False when there is none left, or the budget does not admit any.
+    pub(super) fn step(&mut self, stage: &mut Stage<'_>, allowance: &mut Allowance<'_>) -> bool {
+        if self.paints.is_empty() {
+            self.plan_piece(stage, allowance)
+        } else {
+            self.paint_piece(stage, allowance)
+        }
+    }
+
+    /// Fills in how far the image has come.
+    pub(super) fn report(&self, method: Method, stats: &mut FrameStats) {
+        let covered = stats.covered_pixels.max(1) as f64;
+        stats.estimated_error = match method {
+            Method::Flat | Method::Gouraud => f64::NAN,
+            _ => (self.error_mass.max(0.0) / covered).sqrt(),
+        };
+        stats.refined = self.counters.refined_phts;
+        stats.triangles_subdivided = self.counters.subdivided;
+        stats.leaves = self.forest.open_leaves() as u64;
+        stats.phong_pixels = self.counters.phong_pixels;
+        stats.skipped.triangles_proved = self.counters.proved;
+        stats.skipped.light_terms = self.counters.light_terms;
+    }
+
+    /// A leaf's share of the expected sum of squared errors.
+    fn leaf_mass(&self, leaf: LeafId) -> f64 {
+        let leaf = self.forest.leaf(leaf);
+        f64::from(leaf.pixels) * f64::from(leaf.error)
+    }
+
+    /// The place in `roots` of a visible triangle.
+    fn root_of(&self, triangle: u32) -> Option<u32> {
+        root_of(&self.root_of_triangle, &self.roots, triangle)
+    }
+
+    /// Notes that a root is being subdivided or shaded per pixel.
+    fn mark_refined(&mut self, index: u32, by_splitting: bool) {
+        let root = &mut self.roots[index as usize];
+        self.counters.refined_phts += u64::from(root.is_pht && !root.is_refined);
+        self.counters.subdivided += u64::from(by_splitting && !root.is_split);
+        root.is_refined = true;
+        root.is_split |= by_splitting;
+    }
+}
+
+/// The place in `roots` of a visible triangle. Entries of triangles that were visible in an earlier image are stale.
+fn root_of(root_of_triangle: &[u32], roots: &[Root], triangle: u32) -> Option<u32> {
+    let index = *root_of_triangle.get(triangle as usize)?;
+    let root = roots.get(index as usize)?;
+    (root.triangle == triangle).then_some(index)
+}

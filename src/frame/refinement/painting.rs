@@ -1,0 +1,127 @@
+//! Painting pieces: patches off the list, in order, and what they teach about the leaves they belong to.
+
+use super::{Owner, PIECE_UNITS, Paint, Progressing, Refinement, Stage};
+use crate::backend::{Fill, Patch};
+use crate::geometry::Bary;
+use crate::refine::{LeafId, LeafState};
+use crate::schedule::{Allowance, cost};
+
+/// Most nominal nanoseconds of one patch: a fraction of a piece.
+const PATCH_UNITS: f32 = 12_000.0;
+
+impl Refinement {
+    /// Paints the next patches on the list. False when the budget admits none.
+    pub(super) fn paint_piece(
+        &mut self,
+        stage: &mut Stage<'_>,
+        allowance: &mut Allowance<'_>,
+    ) -> bool {
+        // Threads share a piece. How many patches go into one decides when the clock is looked at, nothing else.
+        let limit = PIECE_UNITS * stage.exec.threads as u64;
+        let mut units = 0;
+        self.piece.clear();
+        self.owners.clear();
+        while let Some(paint) = self.paints.front() {
+            let with_next = units + u64::from(paint.units);
+            let fits = units == 0 || with_next <= limit;
+            if !(fits && allowance.admits(with_next)) {
+                break;
+            }
+            units = with_next;
+            self.piece.push(paint.patch);
+            self.owners.push(paint.owner);
+            self.paints.pop_front();
+        }
+        if self.piece.is_empty() {
+            return false;
+        }
+        let geometry = stage.base.geometry(stage.world, stage.view);
+        stage.backend.repaint(stage.exec, geometry, &mut self.piece);
+        allowance.spend(units);
+        for index in 0..self.piece.len() {
+            let patch = self.piece[index];
+            if matches!(patch.fill, Fill::Phong { .. }) {
+                self.counters.phong_pixels += u64::from(patch.pixels);
+            }
+            if let Owner::Leaf(leaf) = self.owners[index] {
+                self.note_painted(stage, leaf, patch.pixels);
+            }
+        }
+        true
+    }
+
+    /// Counts a patch of a leaf. The last one makes the leaf a candidate again, its pixels now known exactly.
+    fn note_painted(&mut self, stage: &Stage<'_>, leaf: LeafId, pixels: u32) {
+        let progress = &mut self.progressing[leaf as usize];
+        progress.pixels += pixels;
+        progress.patches -= 1;
+        if progress.patches > 0 {
+            return;
+        }
+        let pixels = std::mem::take(&mut progress.pixels);
+        if self.forest.leaf(leaf).state == LeafState::Open {
+            self.error_mass -= self.leaf_mass(leaf);
+            self.forest.set_pixels(leaf, pixels);
+            self.error_mass += self.leaf_mass(leaf);
+            self.offer_leaf(stage, leaf);
+        }
+    }
+
+    /// Puts a patch of about `pixels` pixels on the list, cut into quarters until each is small enough.
+    pub(super) fn enqueue(&mut self, owner: Owner, patch: Patch, pixels: f32) {
+        let units = match patch.fill {
+            Fill::Gouraud(_) => cost::repaint(pixels),
+            Fill::Phong { lights, .. } => cost::phong(pixels, lights.diffuse.len()),
+        };
+        if units > PATCH_UNITS
+            && let Some(quarters) = quarter(&patch)
+        {
+            for part in quarters {
+                self.enqueue(owner, part, pixels * 0.25);
+            }
+            return;
+        }
+        if let Owner::Leaf(leaf) = owner {
+            let index = leaf as usize;
+            if self.progressing.len() <= index {
+                self.progressing.resize(index + 1, Progressing::default());
+            }
+            self.progressing[index].patches += 1;
+        }
+        self.paints.push_back(Paint {
+            patch,
+            owner,
+            units: units as u32,
+        });
+    }
+}
+
+/// The patch as four quarters that paint the same, or `None` where the barycentric grid ends.
+fn quarter(patch: &Patch) -> Option<[Patch; 4]> {
+    let [a, b, c] = patch.corners;
+    let mid = [
+        Bary::midpoint(a, b)?,
+        Bary::midpoint(b, c)?,
+        Bary::midpoint(c, a)?,
+    ];
+    let part = |corners: [Bary; 3], weights: [[f32; 3]; 3]| Patch {
+        corners,
+        fill: match patch.fill {
+            Fill::Gouraud(colours) => Fill::Gouraud(weights.map(|w| {
+                std::array::from_fn(|k| {
+                    w[0] * colours[0][k] + w[1] * colours[1][k] + w[2] * colours[2][k]
+                })
+            })),
+            phong @ Fill::Phong { .. } => phong,
+        },
+        ..*patch
+    };
+    let corner = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let middle = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+    Some([
+        part([a, mid[0], mid[2]], [corner[0], middle[0], middle[2]]),
+        part([mid[0], b, mid[1]], [middle[0], corner[1], middle[1]]),
+        part([mid[2], mid[1], c], [middle[2], middle[1], corner[2]]),
+        part([mid[0], mid[1], mid[2]], middle),
+    ])
+}

@@ -1,0 +1,290 @@
+//! Planning pieces: what to do with the best candidates.
+
+use super::ranking::{self, Action};
+use super::{Candidate, Owner, PIECE_UNITS, Progress, Refinement, Shading, Stage, root_of};
+use crate::backend::{Fill, Patch};
+use crate::geometry::Bary;
+use crate::highlight;
+use crate::illumination::{self, ActiveLights, ShadingKit};
+use crate::refine::{LeafId, LeafState, PlanOutcome, SplitOutcome};
+use crate::schedule::{Allowance, cost};
+
+impl Refinement {
+    /// Takes up the best candidates. False when there are none, or the budget does not admit the next one.
+    pub(super) fn plan_piece(
+        &mut self,
+        stage: &mut Stage<'_>,
+        allowance: &mut Allowance<'_>,
+    ) -> bool {
+        let mut units = 0;
+        while units < PIECE_UNITS {
+            let Some(candidate) = self.queue.pop() else {
+                break;
+            };
+            let more = self.planning_cost(stage, candidate);
+            if !allowance.admits(units + more) {
+                self.deferred.push(candidate);
+                break;
+            }
+            if self.plan(stage, candidate) {
+                units += more;
+            }
+        }
+        self.conclude_plans(stage);
+        allowance.spend(units);
+        let mut deferred = std::mem::take(&mut self.deferred);
+        for candidate in deferred.drain(..) {
+            self.offer(stage, candidate);
+        }
+        self.deferred = deferred;
+        units > 0
+    }
+
+    fn planning_cost(&self, stage: &Stage<'_>, candidate: Candidate) -> u64 {
+        let pixels = match candidate {
+            Candidate::Root(index) => self.roots[index as usize].pixels,
+            Candidate::Leaf(leaf) => self.forest.leaf(leaf).pixels,
+        };
+        ranking::planning_cost(pixels, stage.world.lights.len()) as u64
+    }
+
+    /// Takes a candidate up. False when it has become void.
+    fn plan(&mut self, stage: &Stage<'_>, candidate: Candidate) -> bool {
+        match candidate {
+            Candidate::Root(index) => {
+                let root = self.roots[index as usize];
+                // It may have been planted in this very piece, as the neighbour of another.
+                let is_waiting =
+                    root.progress == Progress::Waiting && !self.forest.is_planted(root.triangle);
+                if is_waiting {
+                    self.plan_root(stage, index);
+                }
+                is_waiting
+            }
+            Candidate::Leaf(leaf) => {
+                let is_open = self.forest.leaf(leaf).state == LeafState::Open;
+                if is_open {
+                    self.plan_leaf(stage, leaf);
+                }
+                is_open
+            }
+        }
+    }
+
+    fn plan_root(&mut self, stage: &Stage<'_>, index: u32) {
+        let root = self.roots[index as usize];
+        // Too small to be worth subdividing, a method that never does, or no room: straight to the pixels.
+        let subdivides = root.pixels > ranking::SMALL_PIXELS && root.shading.is_none();
+        let colours = stage.base.colours();
+        let is_planted = subdivides
+            && self
+                .forest
+                .plant(stage.world, colours, root.triangle, root.pixels)
+                .is_some();
+        if !is_planted {
+            self.shade_root(stage, index);
+        }
+    }
+
+    fn plan_leaf(&mut self, stage: &Stage<'_>, leaf: LeafId) {
+        if self.forest.is_in_plan(leaf) {
+            return self.deferred.push(Candidate::Leaf(leaf));
+        }
+        let marks = match self.choose(stage, leaf).1 {
+            Action::Shade => return self.shade_leaf(stage, leaf),
+            Action::Split(marks) => marks,
+        };
+        let (roots, root_of_triangle) = (&self.roots, &self.root_of_triangle);
+        // A neighbour that is right already, or that nobody sees, need not follow a split.
+        let pixels_to_follow = |triangle: u32| {
+            root_of(root_of_triangle, roots, triangle)
+                .map(|index| roots[index as usize])
+                .filter(|root| root.progress != Progress::Done)
+                .map_or(0, |root| root.pixels)
+        };
+        let colours = stage.base.colours();
+        match self
+            .forest
+            .plan_split(stage.world, colours, leaf, marks, pixels_to_follow)
+        {
+            PlanOutcome::Planned => {}
+            PlanOutcome::Later => self.deferred.push(Candidate::Leaf(leaf)),
+            PlanOutcome::Never => self.shade_leaf(stage, leaf),
+        }
+    }
+
+    /// Illuminates everything that was planned, and carries out what turns out to help.
+    fn conclude_plans(&mut self, stage: &Stage<'_>) {
+        let mut planted = std::mem::take(&mut self.planted);
+        planted.clear();
+        self.forest.illuminate(
+            stage.exec,
+            stage.world,
+            stage.view.eye,
+            stage.base.colours(),
+            &mut planted,
+        );
+        for &leaf in &planted {
+            self.note_planted(stage, leaf);
+        }
+        self.planted = planted;
+
+        let mut splits = std::mem::take(&mut self.splits);
+        splits.clear();
+        self.forest.conclude_splits(stage.world, &mut splits);
+        for split in &splits {
+            self.note_split(stage, split);
+        }
+        self.splits = splits;
+    }
+
+    fn note_planted(&mut self, stage: &Stage<'_>, leaf: LeafId) {
+        if let Some(index) = self.root_of(self.forest.leaf(leaf).triangle) {
+            let root = &mut self.roots[index as usize];
+            root.progress = Progress::Planted;
+            self.error_mass -= f64::from(root.pixels) * f64::from(root.prior);
+            self.error_mass += self.leaf_mass(leaf);
+        }
+        self.offer_leaf(stage, leaf);
+    }
+
+    fn note_split(&mut self, stage: &Stage<'_>, split: &SplitOutcome) {
+        let children = match split {
+            SplitOutcome::Rejected { leaf, error } => {
+                self.error_mass -= self.leaf_mass(*leaf);
+                self.forest.forbid_splitting(*leaf, *error);
+                self.error_mass += self.leaf_mass(*leaf);
+                return self.offer_leaf(stage, *leaf);
+            }
+            SplitOutcome::Committed { parents, children } => {
+                for parent in parents.clone() {
+                    let parent = self.forest.split_parent(parent);
+                    self.error_mass -= self.leaf_mass(parent);
+                    if let Some(index) = self.root_of(self.forest.leaf(parent).triangle) {
+                        self.mark_refined(index, true);
+                    }
+                }
+                children.clone()
+            }
+        };
+        for child in children {
+            self.error_mass += self.leaf_mass(child);
+            let leaf = self.forest.leaf(child);
+            let patch = Patch {
+                triangle: leaf.triangle,
+                corners: leaf.corners,
+                fill: Fill::Gouraud(self.forest.colours(stage.base.colours(), child)),
+                pixels: 0,
+            };
+            let pixels = leaf.pixels as f32;
+            self.enqueue(Owner::Leaf(child), patch, pixels);
+        }
+    }
+
+    /// Has all pixels of a root shaded.
+    fn shade_root(&mut self, stage: &Stage<'_>, index: u32) {
+        let root = self.roots[index as usize];
+        self.roots[index as usize].progress = Progress::Done;
+        self.error_mass -= f64::from(root.pixels) * f64::from(root.prior);
+        self.shade_patch(stage, index, Owner::Root, Bary::ROOT, root.pixels);
+    }
+
+    /// Has the pixels of a leaf shaded.
+    fn shade_leaf(&mut self, stage: &Stage<'_>, id: LeafId) {
+        self.error_mass -= self.leaf_mass(id);
+        self.forest.close(stage.world, id);
+        let leaf = self.forest.leaf(id);
+        let (corners, pixels) = (leaf.corners, leaf.pixels);
+        if let Some(index) = self.root_of(leaf.triangle) {
+            self.shade_patch(stage, index, Owner::Leaf(id), corners, pixels);
+        }
+    }
+
+    fn shade_patch(
+        &mut self,
+        stage: &Stage<'_>,
+        index: u32,
+        owner: Owner,
+        corners: [Bary; 3],
+        pixels: u32,
+    ) {
+        let Shading::PerPixel(lights, remainder) = self.shading(stage, index) else {
+            return;
+        };
+        self.mark_refined(index, false);
+        let patch = Patch {
+            triangle: self.roots[index as usize].triangle,
+            corners,
+            fill: Fill::Phong { lights, remainder },
+            pixels: 0,
+        };
+        self.enqueue(owner, patch, pixels as f32);
+    }
+
+    /// Which terms the pixels of a root need: by its bounds, if finding those costs less than they may save.
+    fn shading(&mut self, stage: &Stage<'_>, index: u32) -> Shading {
+        let root = self.roots[index as usize];
+        if let Some(shading) = root.shading {
+            return shading;
+        }
+        let count = stage.world.lights.len();
+        let full_cost = cost::phong(root.pixels as f32, count);
+        let shading = if full_cost < 2.0 * cost::bounds(count) {
+            Shading::PerPixel(ActiveLights::all(count), [[0.0; 3]; 3])
+        } else {
+            let bounds = highlight::light_masks(stage.world, &stage.view.eye, root.triangle);
+            let evaluated = bounds.active.diffuse.len() + bounds.active.specular.len();
+            self.counters.light_terms += (2 * count - evaluated) as u64;
+            if bounds.verdict == highlight::Verdict::Absent {
+                self.counters.proved += 1;
+                Shading::Proved
+            } else {
+                let remainder = remainder(stage, root.triangle, &bounds.active);
+                Shading::PerPixel(bounds.active, remainder)
+            }
+        };
+        self.roots[index as usize].shading = Some(shading);
+        shading
+    }
+
+    /// Ranks a candidate and puts it on the queue.
+    fn offer(&mut self, stage: &Stage<'_>, candidate: Candidate) {
+        match candidate {
+            Candidate::Leaf(leaf) => self.offer_leaf(stage, leaf),
+            Candidate::Root(index) => {
+                let root = self.roots[index as usize];
+                let rank = self.rank_root(&root, stage.world.lights.len());
+                self.queue.push(rank, candidate);
+            }
+        }
+    }
+
+    /// Ranks an open leaf and puts it on the queue; one without pixels is done.
+    pub(super) fn offer_leaf(&mut self, stage: &Stage<'_>, leaf: LeafId) {
+        if self.forest.leaf(leaf).state != LeafState::Open {
+            return;
+        }
+        if self.forest.leaf(leaf).pixels == 0 {
+            self.forest.close(stage.world, leaf);
+            return;
+        }
+        let rank = self.choose(stage, leaf).0;
+        self.queue.push(rank, Candidate::Leaf(leaf));
+    }
+}
+
+/// What the colours of a triangle's corners owe to terms that are not evaluated per pixel.
+fn remainder(stage: &Stage<'_>, triangle: u32, active: &ActiveLights) -> [[f32; 3]; 3] {
+    let world = stage.world;
+    let corners = world.triangles[triangle as usize].map(|v| v as usize);
+    let material = &world.materials[usize::from(world.triangle_material[triangle as usize])];
+    let evaluated = illumination::shade_corners(
+        stage.exec.level,
+        &ShadingKit::new(stage.view.eye, material, &world.lights),
+        active,
+        corners.map(|v| world.positions.get(v)),
+        corners.map(|v| world.normals.get(v)),
+    );
+    let full = corners.map(|v| stage.base.colours().get(v));
+    std::array::from_fn(|i| std::array::from_fn(|k| full[i][k] - evaluated[i][k]))
+}

@@ -1,0 +1,155 @@
+//! What refining something is worth, per nominal cost.
+//!
+//! The benefit of a step is the expected drop of the sum of squared errors (squared codes times pixels), its cost comes
+//! from [`cost`]. Two steps compete for every leaf:
+//!
+//! * *Splitting* edges whose surplus is at least half of the leaf's largest. Halving an edge quarters the surplus of a
+//!   smooth function there, so the error left is that of the surpluses with the marked ones divided by four. All leaves
+//!   that share a marked edge are repainted: they share benefit and cost.
+//! * *Shading per pixel*, after which no error is left.
+
+use super::{Refinement, Root, Shading, Stage};
+use crate::geometry::Vec3s;
+use crate::refine::LeafId;
+use crate::refine::estimate::sample_count;
+use crate::scene::World;
+use crate::schedule::cost;
+
+/// A triangle of so few pixels is shaded per pixel rather than looked at: that would cost as much.
+pub(super) const SMALL_PIXELS: u32 = 12;
+
+/// Smallest mean squared error that is believed. An estimate of zero is no proof, so everything that is not proved
+/// right is shaded in the end; the floor puts it behind what is known to be wrong.
+const ERROR_FLOOR: f32 = 1e-3;
+
+/// Vertices that a new leaf has to itself: three edge midpoints, most of them shared by two leaves.
+const VERTICES_PER_LEAF: f32 = 1.5;
+
+/// What is to be done to a leaf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Action {
+    /// Evaluate the illumination equation at its pixels.
+    Shade,
+    /// Split its marked edges (bit k: from corner k to corner k + 1).
+    Split(u8),
+}
+
+/// The mean squared error of a triangle before anything is known but its corners: smooth shading that changes by so many
+/// codes between corners deviates from linear by a fraction of it, and a highlight inside by much more. A guess, to be
+/// replaced by an estimate when the triangle's turn comes.
+pub(super) fn prior_error(world: &World, colours: &Vec3s, triangle: u32, is_pht: bool) -> f32 {
+    let corners = world.triangles[triangle as usize];
+    // The square root is close enough to the sRGB curve.
+    let lightness = corners.map(|v| {
+        let [r, g, b] = colours.get(v as usize);
+        ((r + g + b) / 3.0).clamp(0.0, 1.0).sqrt() * 255.0
+    });
+    let [a, b, c] = lightness;
+    let contrast = a.max(b).max(c) - a.min(b).min(c);
+    let highlight = if is_pht { 25.0 } else { 0.0 };
+    contrast * contrast / 64.0 + highlight + ERROR_FLOOR
+}
+
+/// Nominal cost of taking up something of `pixels` pixels, before any pixel is painted.
+pub(super) fn planning_cost(pixels: u32, lights: usize) -> f32 {
+    let points = VERTICES_PER_LEAF + sample_count(pixels) as f32;
+    cost::LEAF_NS + cost::vertices(points, lights)
+}
+
+impl Refinement {
+    /// Rank of a triangle that has not been looked at.
+    pub(super) fn rank_root(&self, root: &Root, lights: usize) -> f32 {
+        let pixels = root.pixels as f32;
+        if self.by_area {
+            return pixels;
+        }
+        let cost = if root.pixels <= SMALL_PIXELS {
+            cost::phong(pixels, lights)
+        } else {
+            planning_cost(root.pixels, lights)
+        };
+        pixels * root.prior / cost
+    }
+
+    /// The better of the two steps for an open leaf, and its rank.
+    pub(super) fn choose(&self, stage: &Stage<'_>, id: LeafId) -> (f32, Action) {
+        let leaf = self.forest.leaf(id);
+        let lights = stage.world.lights.len();
+        let error = leaf.error.max(ERROR_FLOOR);
+        let pixels = leaf.pixels as f32;
+
+        let active = match self
+            .root_of(leaf.triangle)
+            .and_then(|i| self.roots[i as usize].shading)
+        {
+            Some(Shading::Proved) => 0,
+            Some(Shading::PerPixel(active, _)) => active.diffuse.len(),
+            None => lights,
+        };
+        let shade = pixels * error / cost::phong(pixels, active);
+        if !leaf.splittable {
+            return (shade, Action::Shade);
+        }
+
+        let (marks, kept) = self.marks(id);
+        if marks == 0 {
+            return (shade, Action::Shade);
+        }
+        let mut benefit = pixels * error * (1.0 - kept);
+        let mut split_cost = split_cost(pixels, marks.count_ones(), lights);
+        for k in (0..3).filter(|k| marks >> k & 1 == 1) {
+            for (neighbour, edge) in self.forest.neighbours(stage.world, id, k) {
+                let other = self.forest.leaf(neighbour);
+                let surplus = self.forest.edge_surplus(neighbour).map(|s| s.max(0.0));
+                let total: f32 = surplus.iter().map(|s| s * s).sum();
+                if total > 0.0 {
+                    let share = surplus[edge] * surplus[edge] / total;
+                    benefit += other.pixels as f32 * other.error * share * (15.0 / 16.0);
+                }
+                split_cost += self::split_cost(other.pixels as f32, 1, lights);
+            }
+        }
+        let split = benefit / split_cost;
+        if split >= shade {
+            (split, Action::Split(marks))
+        } else {
+            (shade, Action::Shade)
+        }
+    }
+
+    /// Which edges of a leaf to split, and the share of its error that is expected to remain.
+    fn marks(&self, id: LeafId) -> (u8, f32) {
+        let surplus = self.forest.edge_surplus(id);
+        let squares = surplus.map(|s| s.max(0.0) * s.max(0.0));
+        let (total, largest) = (
+            squares.iter().sum::<f32>(),
+            squares.iter().copied().fold(0.0, f32::max),
+        );
+        let known = crate::refine::estimate::EDGE_SHARE * total;
+        if known < 0.5 * self.forest.leaf(id).error {
+            // The error is inside, not at the edges: quarter the leaf and look again.
+            let splittable = (0..3).filter(|&k| surplus[k] >= 0.0);
+            let marks = splittable.fold(0, |marks, k| marks | 1 << k);
+            return (marks, 0.5);
+        }
+        let mut marks = 0;
+        let mut left = 0.0;
+        for k in 0..3 {
+            if surplus[k] >= 0.0 && squares[k] >= 0.25 * largest {
+                marks |= 1 << k;
+                left += squares[k] / 16.0;
+            } else {
+                left += squares[k];
+            }
+        }
+        (marks, if total > 0.0 { left / total } else { 0.0 })
+    }
+}
+
+/// Nominal cost of splitting `edges` edges of a leaf of `pixels` pixels.
+fn split_cost(pixels: f32, edges: u32, lights: usize) -> f32 {
+    let children = (edges + 1) as f32;
+    cost::repaint(pixels)
+        + children * cost::LEAF_NS
+        + cost::vertices(children * VERTICES_PER_LEAF, lights)
+}
