@@ -9,7 +9,7 @@ use specula::geometry::Vec3s;
 use specula::illumination::reference::shade;
 use specula::output::Frame;
 use specula::output::encode::{encode, encode_u8};
-use specula::scene::World;
+use specula::scene::{View, World};
 use support::*;
 
 #[test]
@@ -178,13 +178,12 @@ fn visible_triangles_and_their_pixels_are_counted_exactly() {
 }
 
 /// Counts, for each pixel, how many of the world's triangles cover it, each drawn alone.
-fn coverage(world: &World, width: u32, height: u32) -> Vec<u32> {
-    let view = flat(width, height);
+fn coverage(world: &World, view: &View) -> Vec<u32> {
     let mut backend = SoftwareBackend::new();
-    let (mut ids, mut sum) = (Vec::new(), vec![0; (width * height) as usize]);
+    let (mut ids, mut sum) = (Vec::new(), vec![0; (view.width * view.height) as usize]);
     for id in 0..world.triangles.len() as u32 {
         let range = id..id + 1;
-        backend.rasterize(best(), geometry(world, &view, std::slice::from_ref(&range)));
+        backend.rasterize(best(), geometry(world, view, std::slice::from_ref(&range)));
         backend.ids(&mut ids);
         for (sum, &owner) in sum.iter_mut().zip(&ids) {
             *sum += u32::from(owner != NO_TRIANGLE);
@@ -219,7 +218,7 @@ fn triangles_of_a_fan_cover_each_pixel_around_the_hub_once() {
                 0,
             );
         }
-        let sum = coverage(&world, 80, 80);
+        let sum = coverage(&world, &flat(80, 80));
         for (i, &times) in sum.iter().enumerate() {
             let (x, y) = (
                 (i % 80) as f32 + 0.5 - hub[0],
@@ -270,9 +269,54 @@ fn a_mesh_over_the_whole_image_covers_each_pixel_once_whichever_way_it_is_cut() 
             }
         }
         assert!(
-            coverage(&world, 90, 70).iter().all(|&times| times == 1),
+            coverage(&world, &flat(90, 70))
+                .iter()
+                .all(|&times| times == 1),
             "jitter {jitter}"
         );
+    }
+}
+
+#[test]
+fn a_floor_through_the_near_plane_and_the_guard_band_covers_each_pixel_below_the_horizon_once() {
+    let mut random = Random(10);
+    for round in 0..6 {
+        // A plane below the eye, cut into a grid with vertices moved about in the plane, reaching behind the eye.
+        let (columns, rows) = (9, 12);
+        let points: Vec<[f32; 3]> = (0..=rows)
+            .flat_map(|j| (0..=columns).map(move |i| [i, j]))
+            .map(|[i, j]| {
+                let mut move_by = || random.range(-1.0, 1.0);
+                let (x, z) = (
+                    i as f32 * 6.0 - 27.0 + move_by(),
+                    j as f32 * 3.0 - 9.0 + move_by(),
+                );
+                [x, 1.0, z]
+            })
+            .collect();
+        let mut world = empty_world();
+        for j in 0..rows {
+            for i in 0..columns {
+                let at = |di: usize, dj: usize| points[(j + dj) * (columns + 1) + i + di];
+                let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
+                for half in [[a, b, c], [b, d, c]] {
+                    add_triangle(&mut world, half, [[0.0, -1.0, 0.0]; 3], 1);
+                }
+            }
+        }
+        // In sight, or so near that what is just beyond it leaves the guard band.
+        let near = [2.0, 1e-3, 1e-5][round % 3];
+        let view = perspective(120, 80, 60.0, near, 100.0);
+        for (i, times) in coverage(&world, &view).into_iter().enumerate() {
+            let (x, y) = ((i % 120) as f64 + 0.5 - 60.0, (i / 120) as f64 + 0.5 - 40.0);
+            // Where the pixel's ray meets the plane.
+            let z = 60.0 / y;
+            let x = x / 60.0 * z;
+            assert!(times <= 1, "pixel {i} is covered {times} times");
+            if z > near + 0.01 && z < 24.0 && x.abs() < 24.0 {
+                assert_eq!(times, 1, "pixel {i} is a hole");
+            }
+        }
     }
 }
 

@@ -40,7 +40,7 @@ pub(super) struct Outline {
 
 impl Outline {
     /// The outline of a triangle; `None` when clipping leaves nothing.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(vertices: &Vertices, triangle: [u32; 3]) -> Option<Self> {
         let codes = triangle.map(|v| vertices.outcode(v));
         if codes[0] & codes[1] & codes[2] != 0 {
