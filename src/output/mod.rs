@@ -2,5 +2,7 @@
 
 pub mod encode;
 pub mod frame;
+pub mod png;
 
 pub use frame::Frame;
+pub use png::SaveError;
