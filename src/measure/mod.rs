@@ -2,6 +2,8 @@
 
 pub mod metrics;
 pub mod reference;
+pub mod sweep;
 
 pub use metrics::{ErrorHistogram, ErrorReport, SizeMismatch};
 pub use reference::ReferenceImage;
+pub use sweep::{Calibration, Sweep, SweepBudget, SweepOptions, SweepRow};

@@ -1,0 +1,238 @@
+//! `specula sweep`: error against time.
+
+use super::Failure;
+use super::args::Sweep as Arguments;
+use super::console::{Output, Progress};
+use super::machine::cpu_model;
+use specula::measure::{Calibration, Sweep, SweepBudget, SweepOptions, SweepRow};
+use specula::output::png::plain_reason;
+use specula::scene::Scene;
+use std::fs::File;
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+pub(super) fn run(args: &Arguments) -> Result<(), Failure> {
+    // All that can be wrong is found before a file is touched or a frame rendered.
+    let scenes = args
+        .scenes
+        .iter()
+        .map(|path| Ok((name_of(path), Scene::load(path)?)))
+        .collect::<Result<Vec<_>, Failure>>()?;
+    let options = SweepOptions {
+        width: args.machine.size.width,
+        height: args.machine.size.height,
+        methods: args.methods(),
+        frames: args.frames,
+        repeats: args.repeat,
+        threads: args.machine.threads,
+        simd: args.machine.simd,
+        ..SweepOptions::default()
+    };
+    let mut report = Report {
+        stdout: Output::new(),
+        csv: args.csv.as_deref().map(Csv::create).transpose()?,
+        json: args.json,
+        scene_width: scenes
+            .iter()
+            .map(|(name, _)| name.chars().count())
+            .fold("scene".len(), usize::max),
+    };
+    report.begin(args)?;
+    for (name, scene) in &scenes {
+        sweep_scene(name, scene, &options, args, &mut report)?;
+        if !report.is_wanted() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// What rows call a scene: the file's name without directories and ending.
+fn name_of(path: &Path) -> String {
+    path.file_stem()
+        .map_or_else(|| path.to_string_lossy(), |stem| stem.to_string_lossy())
+        .into_owned()
+}
+
+fn sweep_scene(
+    name: &str,
+    scene: &Scene,
+    options: &SweepOptions,
+    args: &Arguments,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let preparing = Progress::new(0);
+    preparing.doing(format!("{name}: rendering the Phong reference"));
+    let mut sweep = Sweep::new(name, scene, options.clone())?;
+    let budgets: Vec<SweepBudget> = if args.budgets.is_empty() {
+        preparing.measuring(format!("{name}: measuring Gouraud and Phong frames"));
+        let calibration = sweep.calibrate()?;
+        drop(preparing);
+        report.calibrated(name, &calibration, options.calibration_frames)?;
+        let fractions = args.fractions.iter();
+        fractions.map(|&f| calibration.budget(f)).collect()
+    } else {
+        drop(preparing);
+        args.budgets
+            .iter()
+            .map(|&ms| SweepBudget::from_millis(ms))
+            .collect()
+    };
+
+    let progress = Progress::new(sweep.rows(budgets.len()));
+    progress.measuring(name);
+    let mut failure = None;
+    sweep.run(&budgets, |row| {
+        progress.step();
+        match progress.suspend(|| report.row(&row)) {
+            Ok(()) if report.is_wanted() => ControlFlow::Continue(()),
+            Ok(()) => ControlFlow::Break(()),
+            Err(error) => {
+                failure = Some(error);
+                ControlFlow::Break(())
+            }
+        }
+    });
+    failure.map_or(Ok(()), Err)
+}
+
+/// Where rows go.
+#[derive(Debug)]
+struct Report {
+    stdout: Output,
+    csv: Option<Csv>,
+    json: bool,
+    /// Width of the table's first column.
+    scene_width: usize,
+}
+
+impl Report {
+    /// Whether anybody still takes the rows.
+    fn is_wanted(&self) -> bool {
+        self.stdout.is_open() || self.csv.is_some()
+    }
+
+    /// Writes what comes before all rows.
+    fn begin(&mut self, args: &Arguments) -> Result<(), Failure> {
+        if let Some(csv) = &mut self.csv {
+            csv.line(&format!("# specula {} sweep", env!("CARGO_PKG_VERSION")))?;
+            csv.line(&format!("# cpu: {}", cpu_model()))?;
+            csv.line(&format!(
+                "# threads: {}, simd: {}, size: {}x{}, frames: {}, repeats: {}",
+                args.machine.thread_count(),
+                args.machine.simd_level(),
+                args.machine.size.width,
+                args.machine.size.height,
+                args.frames,
+                args.repeat
+            ))?;
+            csv.line(SweepRow::CSV_HEADER)?;
+        }
+        if !self.json {
+            let header = format!(
+                "{:<width$}  {:<10} {:>9} {:>5} {:>9} {:>12} {:>8} {:>7} {:>4} {:>4} {:>10}  converged",
+                "scene",
+                "method",
+                "budget_ms",
+                "frame",
+                "frame_ms",
+                "overshoot_ms",
+                "rmse",
+                "psnr_db",
+                "max",
+                "p99",
+                "subdivided",
+                width = self.scene_width
+            );
+            self.stdout.line(&header)?;
+        }
+        Ok(())
+    }
+
+    /// Notes the times by which a scene's budgets are scaled.
+    fn calibrated(
+        &mut self,
+        name: &str,
+        calibration: &Calibration,
+        frames: u32,
+    ) -> Result<(), Failure> {
+        let text = format!(
+            "# {name}: Gouraud {:.3} ms, Phong {:.3} ms (medians of {frames} alternating frames)",
+            calibration.gouraud_ms, calibration.phong_ms
+        );
+        if let Some(csv) = &mut self.csv {
+            csv.line(&text.replace(['\n', '\r'], " "))?;
+        }
+        if !self.json {
+            self.stdout.line(&text)?;
+        }
+        Ok(())
+    }
+
+    fn row(&mut self, row: &SweepRow) -> Result<(), Failure> {
+        if let Some(csv) = &mut self.csv {
+            csv.line(&row.to_csv())?;
+        }
+        if self.json {
+            let json = serde_json::to_string(row)
+                .map_err(|error| Failure::runtime(format!("cannot print a row: {error}")))?;
+            return self.stdout.line(&json);
+        }
+        let error = &row.error;
+        let psnr = if error.psnr_db.is_finite() {
+            format!("{:.2}", error.psnr_db)
+        } else {
+            "equal".to_owned()
+        };
+        self.stdout.line(&format!(
+            "{:<width$}  {:<10} {:>9.3} {:>5} {:>9.3} {:>+12.3} {:>8.3} {psnr:>7} {:>4} {:>4} {:>10}  {}",
+            row.scene,
+            row.method,
+            row.budget_ms,
+            row.frame,
+            row.frame_ms,
+            row.overshoot_ms,
+            error.rmse,
+            error.max,
+            error.p99,
+            row.triangles_subdivided,
+            if row.converged { "yes" } else { "no" },
+            width = self.scene_width
+        ))
+    }
+}
+
+/// A file of comma-separated values that is complete up to the last row measured, whatever happens next.
+#[derive(Debug)]
+struct Csv {
+    path: PathBuf,
+    file: File,
+}
+
+impl Csv {
+    fn create(path: &Path) -> Result<Self, Failure> {
+        match File::create(path) {
+            Ok(file) => Ok(Self {
+                path: path.to_owned(),
+                file,
+            }),
+            Err(error) => Err(cannot_write(path, &error)),
+        }
+    }
+
+    fn line(&mut self, text: &str) -> Result<(), Failure> {
+        // One unbuffered write for each line: nothing to flush.
+        self.file
+            .write_all(format!("{text}\n").as_bytes())
+            .map_err(|error| cannot_write(&self.path, &error))
+    }
+}
+
+fn cannot_write(path: &Path, error: &io::Error) -> Failure {
+    Failure::runtime(format!(
+        "cannot write {}: {}",
+        path.display(),
+        plain_reason(error)
+    ))
+}

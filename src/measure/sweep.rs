@@ -1,0 +1,372 @@
+//! Error against time: methods and budgets, every measurement from a cold engine.
+//!
+//! **Cold** means that the engine has been told to forget its image, while memory has been touched and the pool is
+//! awake: a frame under the same budget is rendered and thrown away just before.
+//!
+//! Budgets that mean something on any machine are written `G + f (P - G)`, with `G` and `P` the times of a Gouraud and a
+//! Phong frame in the same run: `f = 0` buys Gouraud shading, `f = 1` Phong shading everywhere. Both are
+//! [medians](Calibration) of frames that alternate, so that a change of the machine's speed meets both.
+//!
+//! Of several repetitions the row with the median frame time is kept whole, so that time and error belong together (of
+//! an even number, the faster of the two in the middle).
+
+use super::{ErrorReport, ReferenceImage};
+use crate::clock::{Clock, SystemClock};
+use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
+use crate::output::Frame;
+use crate::scene::Scene;
+use crate::schedule::Budget;
+use crate::simd::SimdLevel;
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// What a sweep measures, and how.
+#[derive(Clone, Debug)]
+pub struct SweepOptions {
+    /// Image width in pixels.
+    pub width: u32,
+    /// Image height in pixels.
+    pub height: u32,
+    /// Methods, each measured at every budget.
+    pub methods: Vec<Method>,
+    /// Consecutive frames of the still view at each budget; zero counts as one.
+    pub frames: u32,
+    /// How often each of them is measured; zero counts as one.
+    pub repeats: u32,
+    /// Frames of each method that [`Sweep::calibrate`] takes the median of; zero counts as one.
+    pub calibration_frames: u32,
+    /// Threads; `None` for as many as the machine has processors.
+    pub threads: Option<usize>,
+    /// SIMD level; `None` for the machine's strongest.
+    pub simd: Option<SimdLevel>,
+    /// Where time comes from.
+    pub clock: Arc<dyn Clock>,
+}
+
+impl Default for SweepOptions {
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 720,
+            methods: vec![Method::Adaptive, Method::PhongArea],
+            frames: 1,
+            repeats: 1,
+            calibration_frames: 30,
+            threads: None,
+            simd: None,
+            clock: Arc::new(SystemClock::new()),
+        }
+    }
+}
+
+impl SweepOptions {
+    fn engine(&self, scene: &Scene, method: Method) -> Result<Engine, EngineError> {
+        Engine::with_options(
+            scene,
+            EngineOptions {
+                method,
+                threads: self.threads,
+                simd: self.simd,
+                clock: Arc::clone(&self.clock),
+            },
+        )
+    }
+}
+
+/// The times that budgets are scaled by, in milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Calibration {
+    /// Median time `G` of a Gouraud-shaded frame.
+    pub gouraud_ms: f64,
+    /// Median time `P` of a Phong-shaded frame.
+    pub phong_ms: f64,
+}
+
+impl Calibration {
+    /// The budget `G + f (P - G)`; `G` where Phong shading was not slower.
+    #[must_use]
+    pub fn budget(&self, fraction: f64) -> SweepBudget {
+        let extra = (self.phong_ms - self.gouraud_ms).max(0.0);
+        SweepBudget {
+            millis: self.gouraud_ms + fraction * extra,
+            fraction: Some(fraction),
+        }
+    }
+}
+
+/// One budget of a sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SweepBudget {
+    /// Wall-clock milliseconds per frame.
+    pub millis: f64,
+    /// The `f` of [`Calibration::budget`] that it was made from.
+    pub fraction: Option<f64>,
+}
+
+impl SweepBudget {
+    /// An absolute budget in milliseconds.
+    #[must_use]
+    pub fn from_millis(millis: f64) -> Self {
+        Self {
+            millis,
+            fraction: None,
+        }
+    }
+}
+
+/// What was measured of one frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SweepRow {
+    /// What the scene is called.
+    pub scene: String,
+    /// The method's name.
+    pub method: &'static str,
+    /// The budget in milliseconds.
+    pub budget_ms: f64,
+    /// The budget as a fraction of the way from Gouraud to Phong shading, if it was given so.
+    pub fraction: Option<f64>,
+    /// The frame of the still view, counted from 1.
+    pub frame: u32,
+    /// How long the frame took.
+    pub frame_ms: f64,
+    /// `frame_ms - budget_ms`.
+    pub overshoot_ms: f64,
+    /// Its error.
+    #[serde(flatten)]
+    pub error: ErrorReport,
+    /// Triangles subdivided so far.
+    pub triangles_subdivided: u64,
+    /// Whether the image is final.
+    pub converged: bool,
+}
+
+impl SweepRow {
+    /// Names of the columns of [`to_csv`](Self::to_csv).
+    pub const CSV_HEADER: &'static str = "scene,method,budget_ms,fraction,frame,frame_ms,overshoot_ms,rmse,psnr_db,\
+        max,p99,share_above_1,share_above_4,triangles_subdivided,converged,covered_pixels,excluded_pixels";
+
+    /// The row as a line of comma-separated values, without a line end; what is infinite or not there is empty.
+    #[must_use]
+    pub fn to_csv(&self) -> String {
+        let number = |value: f64| {
+            if value.is_finite() {
+                format!("{value:.4}")
+            } else {
+                String::new()
+            }
+        };
+        let error = &self.error;
+        [
+            quoted(&self.scene),
+            self.method.to_owned(),
+            number(self.budget_ms),
+            self.fraction.map_or_else(String::new, number),
+            self.frame.to_string(),
+            number(self.frame_ms),
+            number(self.overshoot_ms),
+            number(error.rmse),
+            number(error.psnr_db),
+            error.max.to_string(),
+            error.p99.to_string(),
+            format!("{:.6}", error.share_above_1),
+            format!("{:.6}", error.share_above_4),
+            self.triangles_subdivided.to_string(),
+            self.converged.to_string(),
+            error.covered_pixels.to_string(),
+            error.excluded_pixels.to_string(),
+        ]
+        .join(",")
+    }
+}
+
+/// A field of comma-separated values, in quotes if it needs them.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+/// Sweeps one view of a scene, from the scene's own camera.
+#[derive(Debug)]
+pub struct Sweep<'a> {
+    name: String,
+    scene: &'a Scene,
+    options: SweepOptions,
+    /// One for each method, in order.
+    engines: Vec<Engine>,
+    reference: ReferenceImage,
+    frame: Frame,
+}
+
+impl<'a> Sweep<'a> {
+    /// Makes the engines and renders the Phong reference. `name` is what rows call the scene.
+    ///
+    /// # Errors
+    /// When an engine cannot be made.
+    pub fn new(
+        name: impl Into<String>,
+        scene: &'a Scene,
+        options: SweepOptions,
+    ) -> Result<Self, EngineError> {
+        let engines = options
+            .methods
+            .iter()
+            .map(|&method| options.engine(scene, method))
+            .collect::<Result<Vec<_>, _>>()?;
+        // The world does not depend on the method, but there may be no method.
+        let gouraud = options.engine(scene, Method::Gouraud)?;
+        let world = gouraud.world();
+        let view = world.view(&scene.camera, options.width, options.height);
+        Ok(Self {
+            name: name.into(),
+            scene,
+            reference: ReferenceImage::render(world, &view, gouraud.threads()),
+            frame: Frame::new(options.width, options.height),
+            engines,
+            options,
+        })
+    }
+
+    /// The image that all others are compared with.
+    #[must_use]
+    pub fn reference(&self) -> &ReferenceImage {
+        &self.reference
+    }
+
+    /// How many rows [`run`](Self::run) makes of `budgets` budgets.
+    #[must_use]
+    pub fn rows(&self, budgets: usize) -> u64 {
+        self.engines.len() as u64 * budgets as u64 * u64::from(self.options.frames.max(1))
+    }
+
+    /// Measures the Gouraud and the Phong frame time, cold frames of both alternating.
+    ///
+    /// # Errors
+    /// When an engine cannot be made.
+    pub fn calibrate(&mut self) -> Result<Calibration, EngineError> {
+        let mut engines = [
+            self.options.engine(self.scene, Method::Gouraud)?,
+            self.options.engine(self.scene, Method::Phong)?,
+        ];
+        let mut times = [Vec::new(), Vec::new()];
+        // The first round only touches memory.
+        for round in 0..=self.options.calibration_frames.max(1) {
+            for (engine, times) in engines.iter_mut().zip(&mut times) {
+                engine.forget();
+                let stats = engine.render(self.scene, Budget::Unlimited, &mut self.frame);
+                if round > 0 {
+                    times.push(stats.frame_ms);
+                }
+            }
+        }
+        let [gouraud_ms, phong_ms] = times.map(|mut times| {
+            let middle = median_index(&times, |&ms| ms);
+            times.swap_remove(middle)
+        });
+        Ok(Calibration {
+            gouraud_ms,
+            phong_ms,
+        })
+    }
+
+    /// Measures every method at every budget and hands over each row as soon as it is measured, until `on_row` breaks.
+    /// All methods take their turn at one budget before the next one, so that they meet the same machine.
+    pub fn run(
+        &mut self,
+        budgets: &[SweepBudget],
+        mut on_row: impl FnMut(SweepRow) -> ControlFlow<()>,
+    ) {
+        for &budget in budgets {
+            for method in 0..self.engines.len() {
+                for row in self.measure(method, budget) {
+                    if on_row(row).is_break() {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The rows of one method at one budget, one for each frame.
+    fn measure(&mut self, method: usize, budget: SweepBudget) -> Vec<SweepRow> {
+        let mut repeats: Vec<Vec<SweepRow>> = Vec::new();
+        for _ in 0..self.options.repeats.max(1) {
+            self.render(method, budget, Start::Cold);
+            repeats.push(
+                (1..=self.options.frames.max(1))
+                    .map(|number| {
+                        let start = if number == 1 {
+                            Start::Cold
+                        } else {
+                            Start::Continued
+                        };
+                        let stats = self.render(method, budget, start);
+                        self.row(method, budget, number, &stats)
+                    })
+                    .collect(),
+            );
+        }
+        let frames = repeats.first().map_or(0, Vec::len);
+        (0..frames)
+            .map(|frame| {
+                let middle = median_index(&repeats, |rows| rows[frame].frame_ms);
+                repeats[middle][frame].clone()
+            })
+            .collect()
+    }
+
+    fn render(&mut self, method: usize, budget: SweepBudget, start: Start) -> FrameStats {
+        let engine = &mut self.engines[method];
+        if start == Start::Cold {
+            engine.forget();
+        }
+        engine.render(
+            self.scene,
+            Budget::from_millis(budget.millis),
+            &mut self.frame,
+        )
+    }
+
+    fn row(
+        &self,
+        method: usize,
+        budget: SweepBudget,
+        number: u32,
+        stats: &FrameStats,
+    ) -> SweepRow {
+        SweepRow {
+            scene: self.name.clone(),
+            method: self.options.methods[method].name(),
+            budget_ms: budget.millis,
+            fraction: budget.fraction,
+            frame: number,
+            frame_ms: stats.frame_ms,
+            overshoot_ms: stats.frame_ms - budget.millis,
+            error: ErrorReport::of_same_size(&self.frame, &self.reference),
+            triangles_subdivided: stats.triangles_subdivided,
+            converged: stats.converged,
+        }
+    }
+}
+
+/// How a frame starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Start {
+    /// The engine has forgotten its image.
+    Cold,
+    /// It goes on with the last frame's.
+    Continued,
+}
+
+/// The index of the item whose key is the (lower) median; 0 of nothing.
+fn median_index<T>(items: &[T], key: impl Fn(&T) -> f64) -> usize {
+    let mut order: Vec<usize> = (0..items.len()).collect();
+    order.sort_by(|&a, &b| key(&items[a]).total_cmp(&key(&items[b])));
+    order
+        .get(items.len().saturating_sub(1) / 2)
+        .copied()
+        .unwrap_or(0)
+}
