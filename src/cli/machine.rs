@@ -21,7 +21,8 @@ mod tests {
 
     #[test]
     fn the_model_is_found_among_the_processors_facts() {
-        let text = "processor\t: 0\nmodel\t\t: 85\nmodel name\t: A CPU @ 2.00GHz\n\nprocessor\t: 1\n";
+        let text =
+            "processor\t: 0\nmodel\t\t: 85\nmodel name\t: A CPU @ 2.00GHz\n\nprocessor\t: 1\n";
         assert_eq!(model_name(text).as_deref(), Some("A CPU @ 2.00GHz"));
         assert_eq!(model_name("Features : fp asimd\n"), None);
     }

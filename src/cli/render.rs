@@ -151,8 +151,7 @@ impl FrameReport {
             self.headline(),
             format!(
                 "  stages     {}",
-                list(stages(&stats.stage_ms).map(|(name, ms)| format!("{name} {ms:.2}")))
-                    + " ms"
+                list(stages(&stats.stage_ms).map(|(name, ms)| format!("{name} {ms:.2}"))) + " ms"
             ),
             format!(
                 "  triangles  {} in the scene, {} drawn, {} visible, {} subdivided into {} parts",

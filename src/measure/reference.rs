@@ -5,12 +5,13 @@
 //! the owning triangle's unsnapped barycentrics, clamped to the triangle, and the illumination equation is evaluated,
 //! all in `f64`; the result is clamped to `[0, 1]` and encoded.
 //!
-//! A triangle that had to be clipped is drawn as a fan about the clipped polygon's first vertex, each part by itself,
-//! with the planes of the whole triangle.
+//! A triangle that had to be clipped is drawn as a fan about the clipped polygon's first vertex. The fan faces the way
+//! that its whole snapped area says (parts that rounding turned the other way are left out), and has the depth plane of
+//! the whole triangle, anchored at the top left pixel of the box of everything that is left of it.
 
 use crate::geometry::Vec3s;
 use crate::geometry::screen::{
-    EdgeFunction, PixelBox, TrianglePlanes, clip, normalized_weights, snap,
+    EdgeFunction, PixelBox, TrianglePlanes, clip, doubled_area, normalized_weights, snap,
 };
 use crate::illumination::reference::{Shaded, shade};
 use crate::math::PixelPoint;
@@ -142,49 +143,50 @@ fn owners(world: &World, view: &View, corners: &[PixelPoint]) -> Vec<u32> {
         let planes = TrianglePlanes::new(triangle);
         let polygon = clip(triangle);
         let snapped: Vec<[i32; 2]> = polygon.vertices().iter().map(|&p| snap(p)).collect();
-        for pair in snapped.get(1..).unwrap_or_default().windows(2) {
-            let part = [snapped[0], pair[0], pair[1]];
-            let Some(edges) = front_edges(part, two_sided) else {
-                continue;
-            };
-            let Some(pixels) = PixelBox::of_snapped(&part, view.width, view.height) else {
-                continue;
-            };
-            let plane = planes.depth([pixels.x0, pixels.y0]);
-            for (y, x) in
-                (pixels.y0..=pixels.y1).flat_map(|y| (pixels.x0..=pixels.x1).map(move |x| (y, x)))
-            {
-                let index = y as usize * view.width as usize + x as usize;
-                let depth = plane.at_pixel(x, y);
-                // Ids ascend, so an equally near triangle met later never takes the pixel.
-                if depth > depths[index] && edges.iter().all(|edge| edge.at_pixel(x, y) >= 0) {
-                    (depths[index], ids[index]) = (depth, id);
-                }
+        let Some(pixels) = PixelBox::of_snapped(&snapped, view.width, view.height) else {
+            continue;
+        };
+        let parts = front_parts(&snapped, two_sided);
+        let plane = planes.depth([pixels.x0, pixels.y0]);
+        for (y, x) in
+            (pixels.y0..=pixels.y1).flat_map(|y| (pixels.x0..=pixels.x1).map(move |x| (y, x)))
+        {
+            let index = y as usize * view.width as usize + x as usize;
+            let depth = plane.at_pixel(x, y);
+            let is_covered = |part: &[EdgeFunction; 3]| part.iter().all(|e| e.at_pixel(x, y) >= 0);
+            // Ids ascend, so an equally near triangle met later never takes the pixel.
+            if depth > depths[index] && parts.iter().any(is_covered) {
+                (depths[index], ids[index]) = (depth, id);
             }
         }
     }
     ids
 }
 
-/// The edges of a snapped triangle that is drawn: one that turns counter-clockwise as seen on the screen, or either way
-/// if it is two-sided.
-fn front_edges([a, b, c]: [[i32; 2]; 3], two_sided: bool) -> Option<[EdgeFunction; 3]> {
-    let [u, v] = [b, c].map(|p| [i64::from(p[0] - a[0]), i64::from(p[1] - a[1])]);
-    // The pixel axes being right and down, this is positive for a clockwise turn.
-    let clockwise = u[0] * v[1] - u[1] * v[0];
-    // Edge functions have the inside on the right hand, hence want a clockwise order.
-    let [a, b, c] = if clockwise < 0 {
-        [a, c, b]
-    } else if clockwise > 0 && two_sided {
-        [a, b, c]
-    } else {
-        return None;
-    };
-    Some([
-        EdgeFunction::new(a, b),
-        EdgeFunction::new(b, c),
-        EdgeFunction::new(c, a),
-    ])
+/// The edges of each part of a snapped polygon's fan, turned to the front if it is seen from behind and `two_sided`;
+/// none when it is not drawn.
+fn front_parts(polygon: &[[i32; 2]], two_sided: bool) -> Vec<[EdgeFunction; 3]> {
+    let fan: Vec<[[i32; 2]; 3]> = polygon
+        .get(1..)
+        .unwrap_or_default()
+        .windows(2)
+        .map(|pair| [polygon[0], pair[0], pair[1]])
+        .collect();
+    let area: i64 = fan.iter().map(|&part| doubled_area(part)).sum();
+    if area == 0 || (area < 0 && !two_sided) {
+        return Vec::new();
+    }
+    fan.into_iter()
+        .map(|[a, b, c]| if area < 0 { [a, c, b] } else { [a, b, c] })
+        .filter(|&part| doubled_area(part) > 0)
+        .map(|[a, b, c]| {
+            [
+                EdgeFunction::new(a, b),
+                EdgeFunction::new(b, c),
+                EdgeFunction::new(c, a),
+            ]
+        })
+        .collect()
 }
 
 /// The illumination equation at the centre of a pixel that `triangle` owns.
@@ -218,7 +220,6 @@ fn weighted(vectors: &Vec3s, vertices: [usize; 3], weights: [f64; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::encode;
     use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial};
     use glam::{DMat4, DVec4};
 
@@ -253,8 +254,11 @@ mod tests {
         }
     }
 
-    /// A world of single triangles, with corners, normals and material each.
-    fn world(triangles: &[([[f32; 3]; 3], [[f32; 3]; 3], u16)]) -> World {
+    /// Corners, normals and material.
+    type Triangle = ([[f32; 3]; 3], [[f32; 3]; 3], u16);
+
+    /// A world of single triangles.
+    fn world(triangles: &[Triangle]) -> World {
         let mut world = World {
             materials: vec![
                 material([0.6, 0.1, 0.1], false),
@@ -285,7 +289,7 @@ mod tests {
     const TOWARDS_EYE: [[f32; 3]; 3] = [[0.0, 0.0, 1.0]; 3];
 
     /// A front-facing triangle parallel to the image that fills a good part of it.
-    fn facing(z: f32, material: u16) -> ([[f32; 3]; 3], [[f32; 3]; 3], u16) {
+    fn facing(z: f32, material: u16) -> Triangle {
         let s = -z / 2.0;
         (
             [[-s, -s, z], [s, -s, z], [0.0, s, z]],
@@ -314,7 +318,7 @@ mod tests {
             if id == NO_TRIANGLE {
                 assert_eq!(
                     image.pixels[index],
-                    world.background.map(|v| encode::encode_u8(v.into()))
+                    world.background.map(|v| encode_u8(v.into()))
                 );
                 continue;
             }
@@ -347,7 +351,7 @@ mod tests {
             let material = &world.materials[usize::from(world.triangle_material[id as usize])];
             let expected = shade(ray * t, normal, &view.eye, material, &world.lights);
             for channel in 0..3 {
-                let code = encode::encode(expected.rgb[channel]);
+                let code = encode(expected.rgb[channel]);
                 let found = image.codes[index][channel];
                 assert!(
                     (code - found).abs() < 1e-6,

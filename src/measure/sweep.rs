@@ -330,13 +330,7 @@ impl<'a> Sweep<'a> {
         )
     }
 
-    fn row(
-        &self,
-        method: usize,
-        budget: SweepBudget,
-        number: u32,
-        stats: &FrameStats,
-    ) -> SweepRow {
+    fn row(&self, method: usize, budget: SweepBudget, number: u32, stats: &FrameStats) -> SweepRow {
         SweepRow {
             scene: self.name.clone(),
             method: self.options.methods[method].name(),
@@ -369,4 +363,127 @@ fn median_index<T>(items: &[T], key: impl Fn(&T) -> f64) -> usize {
         .get(items.len().saturating_sub(1) / 2)
         .copied()
         .unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::ManualClock;
+
+    fn scene() -> Scene {
+        Scene::parse("(objects: [(shape: Teapot())])", "teapot.ron").expect("a valid scene")
+    }
+
+    /// On a clock that moves on by a microsecond per reading.
+    fn options() -> SweepOptions {
+        SweepOptions {
+            width: 64,
+            height: 48,
+            methods: vec![Method::Gouraud, Method::Phong],
+            calibration_frames: 3,
+            threads: Some(1),
+            clock: Arc::new(ManualClock::with_step_ns(1_000)),
+            ..SweepOptions::default()
+        }
+    }
+
+    #[test]
+    fn every_frame_of_every_method_and_budget_has_its_row() {
+        let scene = scene();
+        let options = SweepOptions {
+            frames: 2,
+            repeats: 3,
+            ..options()
+        };
+        let mut sweep = Sweep::new("teapot", &scene, options).expect("one thread");
+        let budgets = [0.5, 4.0].map(SweepBudget::from_millis);
+        let mut rows = Vec::new();
+        sweep.run(&budgets, |row| {
+            rows.push(row);
+            ControlFlow::Continue(())
+        });
+        assert_eq!(rows.len() as u64, sweep.rows(budgets.len()));
+        let found: Vec<_> = rows
+            .iter()
+            .map(|row| (row.budget_ms, row.method, row.frame))
+            .collect();
+        let expected: Vec<_> = [0.5, 4.0]
+            .into_iter()
+            .flat_map(|ms| ["gouraud", "phong"].map(|method| (ms, method)))
+            .flat_map(|(ms, method)| [1, 2].map(|frame| (ms, method, frame)))
+            .collect();
+        assert_eq!(found, expected);
+        for row in &rows {
+            assert_eq!(row.overshoot_ms, row.frame_ms - row.budget_ms);
+            assert!(row.error.covered_pixels > 100);
+            // Phong shading is what the reference does; Gouraud shading of 896 triangles is not.
+            assert_eq!(row.error.max <= 1, row.method == "phong", "{row:?}");
+        }
+    }
+
+    #[test]
+    fn a_sweep_ends_when_nobody_takes_its_rows() {
+        let scene = scene();
+        let mut sweep = Sweep::new("teapot", &scene, options()).expect("one thread");
+        let mut rows = 0;
+        sweep.run(&[SweepBudget::from_millis(1.0)], |_| {
+            rows += 1;
+            ControlFlow::Break(())
+        });
+        assert_eq!(rows, 1);
+    }
+
+    #[test]
+    fn fractions_lie_between_gouraud_and_phong() {
+        let scene = scene();
+        let mut sweep = Sweep::new("teapot", &scene, options()).expect("one thread");
+        let measured = sweep.calibrate().expect("one thread");
+        assert!(measured.gouraud_ms > 0.0 && measured.phong_ms > 0.0);
+
+        let calibration = Calibration {
+            gouraud_ms: 2.0,
+            phong_ms: 10.0,
+        };
+        assert_eq!(calibration.budget(0.0).millis, 2.0);
+        assert_eq!(calibration.budget(0.25).millis, 4.0);
+        assert_eq!(calibration.budget(1.0).millis, 10.0);
+        let upside_down = Calibration {
+            gouraud_ms: 3.0,
+            phong_ms: 2.0,
+        };
+        assert_eq!(upside_down.budget(0.5).millis, 3.0);
+    }
+
+    #[test]
+    fn the_median_is_one_of_the_items() {
+        let index = |items: &[f64]| median_index(items, |&item| item);
+        assert_eq!(index(&[]), 0);
+        assert_eq!(index(&[5.0, 1.0, 3.0]), 2);
+        assert_eq!(index(&[4.0, 1.0, 3.0, 2.0]), 3);
+    }
+
+    #[test]
+    fn csv_has_a_field_for_each_column() {
+        let row = SweepRow {
+            scene: "a, \"b\"".to_owned(),
+            method: "phong",
+            budget_ms: 2.0,
+            fraction: None,
+            frame: 1,
+            frame_ms: 2.5,
+            overshoot_ms: 0.5,
+            error: crate::measure::ErrorHistogram::default().report(),
+            triangles_subdivided: 7,
+            converged: true,
+        };
+        let line = row.to_csv();
+        assert!(line.starts_with("\"a, \"\"b\"\"\",phong,2.0000,,1,2.5000,0.5000,0.0000,,0,0,"));
+        // One comma of the line is inside of the quotes.
+        let columns = SweepRow::CSV_HEADER.split(',').count();
+        assert_eq!(line.split(',').count(), columns + 1);
+        let json = serde_json::to_value(&row).expect("plain numbers");
+        for key in SweepRow::CSV_HEADER.split(',') {
+            assert!(json.get(key).is_some(), "no {key} in {json}");
+        }
+    }
 }
