@@ -135,7 +135,7 @@ fn the_order_of_triangles_does_not_matter() {
 #[test]
 fn of_equally_near_triangles_the_smaller_id_wins() {
     let mut world = empty_world();
-    let corners = [[10.0, 10.0, 0.0], [90.0, 10.0, 0.0], [10.0, 90.0, 0.0]];
+    let corners = [[10.0, 10.0, 0.0], [10.0, 90.0, 0.0], [90.0, 10.0, 0.0]];
     for _ in 0..3 {
         add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3], 0);
     }
@@ -213,7 +213,7 @@ fn triangles_of_a_fan_cover_each_pixel_around_the_hub_once() {
             let (p, q) = (at(angles[i]), at(angles[(i + 1) % angles.len()]));
             add_triangle(
                 &mut world,
-                [[hub[0], hub[1], 0.5], p, q],
+                [[hub[0], hub[1], 0.5], q, p],
                 [[0.0, 0.0, 1.0]; 3],
                 0,
             );
@@ -323,7 +323,8 @@ fn a_floor_through_the_near_plane_and_the_guard_band_covers_each_pixel_below_the
 #[test]
 fn back_faces_are_culled_unless_two_sided() {
     let view = flat(50, 50);
-    let front = [[10.0, 10.0, 0.5], [40.0, 10.0, 0.5], [10.0, 40.0, 0.5]];
+    // The y axis points down, so this turns counter-clockwise as seen.
+    let front = [[10.0, 10.0, 0.5], [10.0, 40.0, 0.5], [40.0, 10.0, 0.5]];
     let back = [front[0], front[2], front[1]];
     for (corners, material, drawn, back_facing) in [
         (front, 0, 1, 0),
@@ -519,7 +520,7 @@ fn frames_receive_exactly_the_tiles_that_changed() {
     // In the first tile of eight.
     add_triangle(
         &mut world,
-        [[5.0, 5.0, 0.5], [50.0, 5.0, 0.5], [5.0, 50.0, 0.5]],
+        [[5.0, 5.0, 0.5], [5.0, 50.0, 0.5], [50.0, 5.0, 0.5]],
         [[0.0, 0.0, 1.0]; 3],
         0,
     );

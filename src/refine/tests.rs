@@ -257,8 +257,8 @@ fn dense_error(world: &World, forest: &Forest, colours: &Vec3s) -> f64 {
                 &world.lights,
             );
             let interpolated = at(corners).to_array();
-            for k in 0..3 {
-                let d = encode(shaded.rgb[k]) - encode(interpolated[k]);
+            for (shaded, interpolated) in shaded.rgb.into_iter().zip(interpolated) {
+                let d = encode(shaded) - encode(interpolated);
                 total += d * d * area;
             }
         }
