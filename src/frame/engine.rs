@@ -212,11 +212,11 @@ impl Renderer {
         let mut stats = FrameStats {
             frame: self.frames,
             frame_ms,
-            outcome: match (converged, is_new, allowance.spent_units()) {
-                (true, false, 0) => Outcome::Unchanged,
-                (true, ..) => Outcome::Complete,
-                (false, _, 0) => Outcome::BaseOnly,
-                (false, ..) => Outcome::Refined,
+            outcome: match (is_new, allowance.spent_units(), converged) {
+                (false, 0, _) => Outcome::Unchanged,
+                (_, _, true) => Outcome::Complete,
+                (true, 0, false) => Outcome::BaseOnly,
+                (_, _, false) => Outcome::Refined,
             },
             converged,
             triangles: self.world.triangles.len() as u64,

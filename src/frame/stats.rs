@@ -13,7 +13,7 @@ pub enum Outcome {
     Refined,
     /// There was time for the first image only; if even that took longer than the budget, the frame is late.
     BaseOnly,
-    /// Nothing was left to do: the image was final already.
+    /// Nothing was drawn: the image was final already, or there was no time at all.
     Unchanged,
 }
 
