@@ -116,9 +116,8 @@ pub trait Backend: Debug + Send {
     /// of one call must not overlap. A pixel on the border of two adjacent patches belongs to exactly one.
     fn repaint(&mut self, exec: Exec, geometry: Geometry<'_>, patches: &mut [Patch]);
 
-    /// How many pixels [`present`](Self::present) would have to write to a frame that holds the image presented last, at
-    /// most.
-    fn pending_pixels(&self) -> u64;
+    /// How many pixels [`present`](Self::present) would have to write to `frame` now.
+    fn pending_pixels(&self, frame: &Frame) -> u64;
 
     /// Brings `frame` up to the current image; pixels known to be right already are not touched. The frame has the
     /// view's size. Returns the number of pixels written.

@@ -199,7 +199,7 @@ impl Renderer {
 
         let refining_since = allowance.elapsed_ms();
         if self.method.is_progressive() {
-            self.refine(exec, &view, &mut allowance);
+            self.refine(exec, &view, &mut allowance, frame);
         }
         let presenting_since = allowance.elapsed_ms();
         stages.refine += presenting_since - refining_since;
@@ -279,8 +279,14 @@ impl Renderer {
         // Which triangles can hold a highlight, and what is worth refining?
         if self.method.is_progressive() {
             self.base.classify(exec, &self.world, view, backend);
-            self.refinement
-                .collect_candidates(self.method, &self.world, &self.base, backend);
+            self.refinement.collect_candidates(
+                exec,
+                self.method,
+                &self.world,
+                view,
+                &self.base,
+                backend,
+            );
         } else {
             self.refinement.clear();
         }
@@ -290,7 +296,7 @@ impl Renderer {
     }
 
     /// Spends what is left of the budget, less what handing the image over will take.
-    fn refine(&mut self, exec: Exec, view: &View, allowance: &mut Allowance<'_>) {
+    fn refine(&mut self, exec: Exec, view: &View, allowance: &mut Allowance<'_>, frame: &Frame) {
         let mut stage = super::refinement::Stage {
             exec,
             world: &self.world,
@@ -299,7 +305,7 @@ impl Renderer {
             backend: &mut *self.backend,
         };
         loop {
-            let pending = stage.backend.pending_pixels();
+            let pending = stage.backend.pending_pixels(frame);
             allowance.reserve_ms(f64::from(cost::present(pending)) * 1e-6);
             if !self.refinement.step(&mut stage, allowance) {
                 break;

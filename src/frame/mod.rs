@@ -1,7 +1,7 @@
 //! The engine: the one place that knows all stages.
 //!
-//! [`Engine::render`] is the frame loop. Read it first; it says what happens in a frame and in which order. [`base`] draws
-//! the first image, [`refinement`] makes it better.
+//! `engine.rs` holds the frame loop. Read it first; it says what happens in a frame and in which order. `base.rs` draws
+//! the first image, `refinement/` makes it better.
 
 mod base;
 mod engine;

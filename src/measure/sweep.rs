@@ -322,6 +322,8 @@ impl<'a> Sweep<'a> {
         let engine = &mut self.engines[method];
         if start == Start::Cold {
             engine.forget();
+            // As in calibration, every pixel is handed over anew.
+            self.frame.pixels_mut();
         }
         engine.render(
             self.scene,

@@ -68,12 +68,14 @@ impl<'a> Allowance<'a> {
         }
     }
 
-    /// Work units that the next piece may take at most.
+    /// Nominal nanoseconds that are left.
     #[must_use]
     pub fn units_left(&self) -> u64 {
         match self.budget {
+            Budget::Unlimited => u64::MAX,
             Budget::Work(total) => total.saturating_sub(self.spent_units),
-            Budget::Millis(_) | Budget::Unlimited => u64::MAX,
+            // The conversion saturates at zero.
+            Budget::Millis(ms) => ((ms - self.elapsed_ms() - self.reserve_ms) * 1e6) as u64,
         }
     }
 

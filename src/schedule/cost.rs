@@ -6,22 +6,28 @@
 //! from one machine to the next, nor the image refinement converges to.
 
 /// Illuminating a vertex: a fixed part, and a part for each light.
-pub const VERTEX_NS: f32 = 4.0;
+pub const VERTEX_NS: f32 = 0.9;
 /// See [`VERTEX_NS`].
-pub const VERTEX_LIGHT_NS: f32 = 3.0;
-/// Repainting a pixel with interpolated colours.
-pub const REPAINT_PIXEL_NS: f32 = 1.5;
-/// Shading a pixel by the illumination equation: a fixed part, and a part for each active light.
-pub const PHONG_PIXEL_NS: f32 = 3.0;
-/// See [`PHONG_PIXEL_NS`].
-pub const PHONG_PIXEL_LIGHT_NS: f32 = 2.0;
-/// Bookkeeping and set-up for a leaf, whatever its size.
-pub const LEAF_NS: f32 = 250.0;
-/// Bounding one light on one triangle.
-pub const BOUND_LIGHT_NS: f32 = 60.0;
-
+pub const VERTEX_LIGHT_NS: f32 = 0.9;
+/// Making a leaf, as a root or by a split: edges, midpoints, estimate and bookkeeping, without illumination.
+pub const LEAF_NS: f32 = 400.0;
+/// Repainting a patch with interpolated colours: a fixed part, and a part for each pixel.
+pub const REPAINT_NS: f32 = 280.0;
+/// See [`REPAINT_NS`].
+pub const REPAINT_PIXEL_NS: f32 = 4.8;
+/// Shading a patch by the illumination equation: a fixed part, a part for each pixel, and one for each pixel and active
+/// light.
+pub const PHONG_NS: f32 = 400.0;
+/// See [`PHONG_NS`].
+pub const PHONG_PIXEL_NS: f32 = 7.2;
+/// See [`PHONG_NS`].
+pub const PHONG_PIXEL_LIGHT_NS: f32 = 1.35;
+/// Bounding the lights on a triangle: a fixed part, and a part for each light.
+pub const BOUNDS_NS: f32 = 190.0;
+/// See [`BOUNDS_NS`].
+pub const BOUNDS_LIGHT_NS: f32 = 150.0;
 /// Copying a pixel into the caller's frame.
-pub const PRESENT_PIXEL_NS: f32 = 0.5;
+pub const PRESENT_PIXEL_NS: f32 = 0.35;
 
 /// Illuminating `vertices` points under `lights` lights.
 #[must_use]
@@ -29,26 +35,38 @@ pub fn vertices(vertices: f32, lights: usize) -> f32 {
     vertices * (VERTEX_NS + VERTEX_LIGHT_NS * lights as f32)
 }
 
-/// Repainting a leaf of `pixels` pixels.
+/// Making `leaves` leaves, each with `points` points to illuminate under `lights` lights.
 #[must_use]
-pub fn repaint(pixels: f32) -> f32 {
-    LEAF_NS + pixels * REPAINT_PIXEL_NS
+pub fn leaves(leaves: f32, points: f32, lights: usize) -> f32 {
+    leaves * (LEAF_NS + vertices(points, lights))
 }
 
-/// Shading a leaf of `pixels` pixels under `lights` active lights.
+/// Repainting `patches` patches of `pixels` pixels altogether.
+#[must_use]
+pub fn repaint(patches: f32, pixels: f32) -> f32 {
+    patches * REPAINT_NS + pixels * REPAINT_PIXEL_NS
+}
+
+/// Shading a patch of `pixels` pixels under `lights` active lights.
 #[must_use]
 pub fn phong(pixels: f32, lights: usize) -> f32 {
-    LEAF_NS + pixels * (PHONG_PIXEL_NS + PHONG_PIXEL_LIGHT_NS * lights as f32)
+    PHONG_NS + pixels * (PHONG_PIXEL_NS + PHONG_PIXEL_LIGHT_NS * lights as f32)
+}
+
+/// Bounding `lights` lights on a triangle.
+#[must_use]
+pub fn bounds(lights: usize) -> f32 {
+    BOUNDS_NS + BOUNDS_LIGHT_NS * lights as f32
+}
+
+/// What leaving a light out of the shading of `pixels` pixels saves.
+#[must_use]
+pub fn light_saved(pixels: f32) -> f32 {
+    pixels * PHONG_PIXEL_LIGHT_NS
 }
 
 /// Copying `pixels` pixels into the caller's frame.
 #[must_use]
 pub fn present(pixels: u64) -> f32 {
     pixels as f32 * PRESENT_PIXEL_NS
-}
-
-/// Bounding `lights` lights on a triangle.
-#[must_use]
-pub fn bounds(lights: usize) -> f32 {
-    BOUND_LIGHT_NS * lights as f32
 }

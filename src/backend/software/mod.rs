@@ -53,8 +53,6 @@ pub struct SoftwareBackend {
     writer: u64,
     /// Counts the passes that may change colours.
     serial: u64,
-    /// The serial of the image presented last.
-    presented: u64,
     grid: Grid,
     tiles: Vec<Tile>,
     shares: Vec<Share>,
@@ -86,7 +84,6 @@ impl SoftwareBackend {
         Self {
             writer: WRITERS.fetch_add(1, Ordering::Relaxed),
             serial: 0,
-            presented: 0,
             grid: Grid::default(),
             tiles: Vec::new(),
             shares: Vec::new(),
@@ -211,16 +208,14 @@ impl Backend for SoftwareBackend {
         }
     }
 
-    fn pending_pixels(&self) -> u64 {
-        let changed = self
-            .tiles
-            .iter()
-            .filter(|tile| tile.serial > self.presented);
-        changed.map(Tile::pixels).sum()
+    fn pending_pixels(&self, frame: &Frame) -> u64 {
+        let known = present::known_serial(self.writer, frame);
+        present::stale_tiles(&self.tiles, known)
+            .map(Tile::pixels)
+            .sum()
     }
 
     fn present(&mut self, exec: Exec, frame: &mut Frame) -> u64 {
-        self.presented = self.serial;
         let now = Stamp {
             writer: self.writer,
             serial: self.serial,

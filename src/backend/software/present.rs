@@ -19,23 +19,32 @@ pub(super) fn present(
     if (frame.width(), frame.height()) != (grid.width, grid.height) {
         return 0;
     }
-    let known = frame
-        .stamp()
-        .filter(|stamp| stamp.writer == now.writer)
-        .map(|stamp| stamp.serial);
-    let stale = |tile: &&Tile| known.is_none_or(|serial| tile.serial > serial);
-    let written = tiles.iter().filter(stale).map(Tile::pixels).sum();
+    let known = known_serial(now.writer, frame);
+    let written = stale_tiles(tiles, known).map(Tile::pixels).sum();
     let pixels = frame.pixels_stamped(now);
     if written > 0 {
         let width = grid.width as usize;
         exec.for_each_chunk(pixels, width * TILE_SIDE, |row, band| {
             let first = row * grid.columns;
-            for tile in tiles[first..first + grid.columns].iter().filter(stale) {
+            for tile in stale_tiles(&tiles[first..first + grid.columns], known) {
                 copy_tile(tile, width, band);
             }
         });
     }
     written
+}
+
+/// The serial of the image that `frame` holds, if `writer` filled it last.
+pub(super) fn known_serial(writer: u64, frame: &Frame) -> Option<u64> {
+    let stamp = frame.stamp().filter(|stamp| stamp.writer == writer)?;
+    Some(stamp.serial)
+}
+
+/// The tiles that a frame lacks which holds the image of serial `known`, or an unknown one.
+pub(super) fn stale_tiles(tiles: &[Tile], known: Option<u64>) -> impl Iterator<Item = &Tile> {
+    tiles
+        .iter()
+        .filter(move |tile| known.is_none_or(|serial| tile.serial > serial))
 }
 
 /// Copies a tile into the rows of the frame that it takes part in.

@@ -32,7 +32,7 @@ use crate::simd::{Simd, dispatch};
 use fearless_simd::{Select, SimdBase, SimdFloat, SimdMask};
 
 /// Jobs are not split into fewer than these.
-const JOBS_PER_TASK: usize = 32;
+const JOBS_PER_TASK: usize = 4;
 
 /// Where 1 lies on the grid of pixels' barycentric coordinates.
 const GRID_UNIT: i32 = 2 * Bary::UNIT as i32;

@@ -22,6 +22,7 @@ use super::stats::FrameStats;
 use crate::backend::{Backend, Patch};
 use crate::illumination::ActiveLights;
 use crate::parallel::Exec;
+use crate::refine::estimate::Samples;
 use crate::refine::{Forest, LeafId, SplitOutcome};
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, RankedQueue};
@@ -29,6 +30,9 @@ use std::collections::VecDeque;
 
 /// Nominal nanoseconds between two looks at the clock.
 const PIECE_UNITS: u64 = 50_000;
+
+/// A triangle of fewer pixels is ranked by its corners alone: a sample would cost as much as shading some of them.
+const PIXELS_FOR_CENTROID: u32 = 8;
 
 /// What the stages of refinement work on.
 pub(super) struct Stage<'a> {
@@ -124,6 +128,7 @@ pub(super) struct Refinement {
     /// Expected sum of squared errors over all covered pixels, per channel, in squared codes.
     error_mass: f64,
     counters: Counters,
+    samples: Samples,
     // Workspaces of a piece.
     piece: Vec<Patch>,
     owners: Vec<Owner>,
@@ -161,8 +166,10 @@ impl Refinement {
     /// Makes every visible triangle of a new image a candidate.
     pub(super) fn collect_candidates(
         &mut self,
+        exec: Exec,
         method: Method,
         world: &World,
+        view: &View,
         base: &BaseImage,
         backend: &dyn Backend,
     ) {
@@ -177,24 +184,48 @@ impl Refinement {
             Shading::PerPixel(all, [[0.0; 3]; 3])
         });
         for (index, &triangle) in backend.visible_triangles().iter().enumerate() {
-            let pixels = backend.visible_pixels(triangle);
             let is_pht = base.is_pht(world, triangle);
-            let prior = ranking::prior_error(world, base.colours(), triangle, is_pht);
-            let root = Root {
+            self.root_of_triangle[triangle as usize] = index as u32;
+            self.roots.push(Root {
                 triangle,
-                pixels,
-                prior,
+                pixels: backend.visible_pixels(triangle),
+                prior: ranking::prior_error(world, base.colours(), triangle, is_pht),
                 is_pht,
                 progress: Progress::Waiting,
                 is_split: false,
                 is_refined: false,
                 shading,
-            };
-            self.root_of_triangle[triangle as usize] = index as u32;
-            self.roots.push(root);
-            self.error_mass += f64::from(pixels) * f64::from(prior);
-            let rank = self.rank_root(&root, world.lights.len());
+            });
+        }
+        if !self.by_area {
+            self.sample_centroids(exec, world, view, base);
+        }
+        for index in 0..self.roots.len() {
+            let root = self.roots[index];
+            self.error_mass += f64::from(root.pixels) * f64::from(root.prior);
+            let (rank, _) = self.choose_for_root(&root, world.lights.len());
             self.queue.push(rank, Candidate::Root(index as u32));
+        }
+    }
+
+    /// Adds to the prior error of triangles what one true colour, at their centroids, has to say.
+    fn sample_centroids(&mut self, exec: Exec, world: &World, view: &View, base: &BaseImage) {
+        self.samples.clear();
+        let is_sampled = |root: &&mut Root| root.pixels >= PIXELS_FOR_CENTROID;
+        for root in self.roots.iter_mut().filter(is_sampled) {
+            let corners = world.triangles[root.triangle as usize].map(|v| v as usize);
+            let material = world.triangle_material[root.triangle as usize];
+            self.samples.push(
+                mean(corners.map(|v| world.positions.get(v))),
+                mean(corners.map(|v| world.normals.get(v))),
+                material,
+                mean(corners.map(|v| base.colours().get(v))),
+            );
+        }
+        self.samples.illuminate(exec, world, view.eye);
+        for (sample, root) in self.roots.iter_mut().filter(is_sampled).enumerate() {
+            let [r, g, b] = self.samples.deviation(sample);
+            root.prior += ranking::CENTROID_SHARE * (r * r + g * g + b * b) / 3.0;
         }
     }
 
@@ -241,6 +272,11 @@ impl Refinement {
         root.is_refined = true;
         root.is_split |= by_splitting;
     }
+}
+
+/// The mean of a triangle's corners.
+fn mean(v: [[f32; 3]; 3]) -> [f32; 3] {
+    std::array::from_fn(|k| (v[0][k] + v[1][k] + v[2][k]) / 3.0)
 }
 
 /// The place in `roots` of a visible triangle. Entries of triangles that were visible in an earlier image are stale.

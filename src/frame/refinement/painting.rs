@@ -6,6 +6,9 @@ use crate::geometry::Bary;
 use crate::refine::{LeafId, LeafState};
 use crate::schedule::{Allowance, cost};
 
+/// A painting piece of several threads is at most so many times as long, per thread, as one of a single thread.
+const MOST_PIECES_AT_ONCE: u64 = 8;
+
 /// Most nominal nanoseconds of one patch: a fraction of a piece.
 const PATCH_UNITS: f32 = 12_000.0;
 
@@ -16,8 +19,7 @@ impl Refinement {
         stage: &mut Stage<'_>,
         allowance: &mut Allowance<'_>,
     ) -> bool {
-        // Threads share a piece. How many patches go into one decides when the clock is looked at, nothing else.
-        let limit = PIECE_UNITS * stage.exec.threads as u64;
+        let limit = painting_limit(stage, allowance);
         let mut units = 0;
         self.piece.clear();
         self.owners.clear();
@@ -70,7 +72,7 @@ impl Refinement {
     /// Puts a patch of about `pixels` pixels on the list, cut into quarters until each is small enough.
     pub(super) fn enqueue(&mut self, owner: Owner, patch: Patch, pixels: f32) {
         let units = match patch.fill {
-            Fill::Gouraud(_) => cost::repaint(pixels),
+            Fill::Gouraud(_) => cost::repaint(1.0, pixels),
             Fill::Phong { lights, .. } => cost::phong(pixels, lights.diffuse.len()),
         };
         if units > PATCH_UNITS
@@ -94,6 +96,19 @@ impl Refinement {
             units: units as u32,
         });
     }
+}
+
+/// Most nominal nanoseconds of a painting piece. How many patches go into one decides when the clock is looked at, and
+/// nothing else. Threads share a piece, and waking them costs tens of microseconds, so pieces are longer for several of
+/// them while the deadline is far away: a quarter of what is left.
+fn painting_limit(stage: &Stage<'_>, allowance: &Allowance<'_>) -> u64 {
+    let threads = stage.exec.threads as u64;
+    if threads == 1 {
+        return PIECE_UNITS;
+    }
+    (allowance.units_left() / 4)
+        .clamp(PIECE_UNITS, MOST_PIECES_AT_ONCE * PIECE_UNITS)
+        .saturating_mul(threads)
 }
 
 /// The patch as four quarters that paint the same, or `None` where the barycentric grid ends.

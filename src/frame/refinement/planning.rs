@@ -73,10 +73,10 @@ impl Refinement {
 
     fn plan_root(&mut self, stage: &Stage<'_>, index: u32) {
         let root = self.roots[index as usize];
-        // Too small to be worth subdividing, a method that never does, or no room: straight to the pixels.
-        let subdivides = root.pixels > ranking::SMALL_PIXELS && root.shading.is_none();
+        let (_, action) = self.choose_for_root(&root, stage.world.lights.len());
         let colours = stage.base.colours();
-        let is_planted = subdivides
+        // Without room for another leaf it is shaded, too.
+        let is_planted = action != Action::Shade
             && self
                 .forest
                 .plant(stage.world, colours, root.triangle, root.pixels)
@@ -228,8 +228,9 @@ impl Refinement {
             return shading;
         }
         let count = stage.world.lights.len();
-        let full_cost = cost::phong(root.pixels as f32, count);
-        let shading = if full_cost < 2.0 * cost::bounds(count) {
+        // Perhaps half of the lights can be left out.
+        let hoped_for = cost::light_saved(root.pixels as f32) * count as f32 * 0.5;
+        let shading = if hoped_for < cost::bounds(count) {
             Shading::PerPixel(ActiveLights::all(count), [[0.0; 3]; 3])
         } else {
             let bounds = highlight::light_masks(stage.world, &stage.view.eye, root.triangle);
@@ -253,7 +254,7 @@ impl Refinement {
             Candidate::Leaf(leaf) => self.offer_leaf(stage, leaf),
             Candidate::Root(index) => {
                 let root = self.roots[index as usize];
-                let rank = self.rank_root(&root, stage.world.lights.len());
+                let (rank, _) = self.choose_for_root(&root, stage.world.lights.len());
                 self.queue.push(rank, candidate);
             }
         }

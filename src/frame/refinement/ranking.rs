@@ -15,17 +15,18 @@ use crate::refine::estimate::sample_count;
 use crate::scene::World;
 use crate::schedule::cost;
 
-/// A triangle of so few pixels is shaded per pixel rather than looked at: that would cost as much.
-pub(super) const SMALL_PIXELS: u32 = 12;
-
 /// Smallest mean squared error that is believed. An estimate of zero is no proof, so everything that is not proved
 /// right is shaded in the end; the floor puts it behind what is known to be wrong.
-const ERROR_FLOOR: f32 = 1e-3;
+pub(super) const ERROR_FLOOR: f32 = 1e-3;
 
-/// Vertices that a new leaf has to itself: three edge midpoints, most of them shared by two leaves.
-const VERTICES_PER_LEAF: f32 = 1.5;
+/// Mean squared error by the square of the deviation at the centroid: a quadratic with equal surplus `m` at the three
+/// edge midpoints deviates by `4/3 m` there, and its mean square is `16/15 m^2`.
+pub(super) const CENTROID_SHARE: f32 = 0.6;
 
-/// What is to be done to a leaf.
+/// Points that a new leaf has to itself: three edge midpoints, most of them shared by two leaves.
+const POINTS_PER_LEAF: f32 = 1.5;
+
+/// What is to be done to a triangle or leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Action {
     /// Evaluate the illumination equation at its pixels.
@@ -34,8 +35,8 @@ pub(super) enum Action {
     Split(u8),
 }
 
-/// The mean squared error of a triangle before anything is known but its corners: smooth shading that changes by so many
-/// codes between corners deviates from linear by a fraction of it, and a highlight inside by much more. A guess, to be
+/// What is added to the mean squared error of a triangle for what its centroid does not show: shading that changes by so
+/// many codes between corners deviates from linear by a fraction of it, and a highlight inside by more. A guess, to be
 /// replaced by an estimate when the triangle's turn comes.
 pub(super) fn prior_error(world: &World, colours: &Vec3s, triangle: u32, is_pht: bool) -> f32 {
     let corners = world.triangles[triangle as usize];
@@ -46,29 +47,33 @@ pub(super) fn prior_error(world: &World, colours: &Vec3s, triangle: u32, is_pht:
     });
     let [a, b, c] = lightness;
     let contrast = a.max(b).max(c) - a.min(b).min(c);
-    let highlight = if is_pht { 25.0 } else { 0.0 };
-    contrast * contrast / 64.0 + highlight + ERROR_FLOOR
+    let highlight = if is_pht { 4.0 } else { 0.0 };
+    contrast * contrast / 1024.0 + highlight + ERROR_FLOOR
 }
 
 /// Nominal cost of taking up something of `pixels` pixels, before any pixel is painted.
 pub(super) fn planning_cost(pixels: u32, lights: usize) -> f32 {
-    let points = VERTICES_PER_LEAF + sample_count(pixels) as f32;
-    cost::LEAF_NS + cost::vertices(points, lights)
+    let points = POINTS_PER_LEAF + sample_count(pixels) as f32;
+    cost::leaves(1.0, points, lights)
 }
 
 impl Refinement {
-    /// Rank of a triangle that has not been looked at.
-    pub(super) fn rank_root(&self, root: &Root, lights: usize) -> f32 {
+    /// What to do with a triangle that has not been looked at, and its rank: shade it, or make it the root of a
+    /// subdivision, whose first split is assumed to be into four.
+    pub(super) fn choose_for_root(&self, root: &Root, lights: usize) -> (f32, Action) {
         let pixels = root.pixels as f32;
         if self.by_area {
-            return pixels;
+            return (pixels, Action::Shade);
         }
-        let cost = if root.pixels <= SMALL_PIXELS {
-            cost::phong(pixels, lights)
+        let benefit = pixels * root.prior;
+        let shade = benefit / cost::phong(pixels, lights);
+        let planting = planning_cost(root.pixels, lights);
+        let split = benefit * (15.0 / 16.0) / (planting + split_cost(pixels, 3, lights));
+        if split > shade {
+            (split, Action::Split(7))
         } else {
-            planning_cost(root.pixels, lights)
-        };
-        pixels * root.prior / cost
+            (shade, Action::Shade)
+        }
     }
 
     /// The better of the two steps for an open leaf, and its rank.
@@ -146,10 +151,8 @@ impl Refinement {
     }
 }
 
-/// Nominal cost of splitting `edges` edges of a leaf of `pixels` pixels.
+/// Nominal cost of splitting `edges` edges of a leaf of `pixels` pixels, and painting its children.
 fn split_cost(pixels: f32, edges: u32, lights: usize) -> f32 {
     let children = (edges + 1) as f32;
-    cost::repaint(pixels)
-        + children * cost::LEAF_NS
-        + cost::vertices(children * VERTICES_PER_LEAF, lights)
+    cost::leaves(children, POINTS_PER_LEAF, lights) + cost::repaint(children, pixels)
 }
