@@ -43,6 +43,8 @@ pub struct Leaf {
     pub pixels: u32,
     /// Estimated mean squared error in squared codes; see [`estimate`].
     pub error: f32,
+    /// Share of its area that holds the error, in (0, 1]: small when samples found it in few places.
+    pub spread: f32,
     /// What has become of it.
     pub state: LeafState,
     /// False when a split was found not to help.
@@ -145,7 +147,7 @@ impl Forest {
         };
         self.prepare(world, base_colours, &mut root);
         let samples = root.samples.clone();
-        let id = self.insert(world, &root, 0.0);
+        let id = self.insert(world, &root, LeafError::NONE);
         self.leaves[id as usize].pixels = pixels;
         self.planted.insert(triangle, id);
         self.fresh.push((id, samples));
@@ -172,7 +174,8 @@ impl Forest {
         self.samples.illuminate(exec, world, eye);
         for (id, samples) in std::mem::take(&mut self.fresh).drain(..) {
             let error = self.own_error(self.leaves[id as usize].midpoints, samples);
-            self.leaves[id as usize].error = error;
+            let leaf = &mut self.leaves[id as usize];
+            (leaf.error, leaf.spread) = (error.mean_square, error.spread);
             planted.push(id);
         }
         self.estimate_planned(exec, base_colours);
@@ -213,6 +216,15 @@ impl Forest {
     ) -> impl Iterator<Item = (LeafId, usize)> + '_ {
         self.half_edges(world, id, k)
             .filter(move |&(other, _)| other != id)
+    }
+
+    /// Notes that the leaf will be shaded part by part: until it is [closed](Self::close), neither it nor its edges are
+    /// split, so that what is not shaded yet keeps matching its neighbours.
+    pub fn pin(&mut self, id: LeafId) {
+        let leaf = &mut self.leaves[id as usize];
+        leaf.splittable = false;
+        leaf.midpoints = [NONE; 3];
+        leaf.error = 0.0;
     }
 
     /// Linear colours at the leaf's corners.
@@ -265,7 +277,7 @@ impl Forest {
     }
 
     /// Error of a leaf by the surplus at its edges and the deviations at its samples.
-    pub(super) fn own_error(&self, midpoints: [u32; 3], samples: Range<usize>) -> f32 {
+    pub(super) fn own_error(&self, midpoints: [u32; 3], samples: Range<usize>) -> LeafError {
         let surplus = midpoints.map(|v| {
             if v == NONE {
                 [0.0; 3]
@@ -273,20 +285,33 @@ impl Forest {
                 self.vertices.surplus(v)
             }
         });
-        let at_edges = estimate::mean_square([[0.0; 3]; 3], surplus);
-        let inside = mean_of_squares(samples.map(|sample| self.samples.deviation(sample)));
-        at_edges.max(inside)
+        let at_edges = LeafError {
+            mean_square: estimate::mean_square([[0.0; 3]; 3], surplus),
+            spread: 1.0,
+        };
+        let inside = LeafError::of_samples(samples.map(|sample| self.samples.deviation(sample)));
+        if inside.mean_square > at_edges.mean_square {
+            inside
+        } else {
+            at_edges
+        }
     }
 
     /// Adds a leaf and hooks its edges up.
-    pub(super) fn insert(&mut self, world: &World, seedling: &Seedling, error: f32) -> LeafId {
+    pub(super) fn insert(
+        &mut self,
+        world: &World,
+        seedling: &Seedling,
+        error: LeafError,
+    ) -> LeafId {
         let id = self.leaves.len() as LeafId;
         self.leaves.push(Leaf {
             triangle: seedling.triangle,
             corners: seedling.corners,
             vertices: seedling.vertices,
             pixels: seedling.pixels as u32,
-            error,
+            error: error.mean_square,
+            spread: error.spread,
             state: LeafState::Open,
             splittable: true,
             midpoints: seedling.midpoints,
@@ -372,12 +397,39 @@ pub(super) fn blend(weights: [f32; 3], v: [[f32; 3]; 3]) -> [f32; 3] {
     std::array::from_fn(|k| weights[0] * v[0][k] + weights[1] * v[1][k] + weights[2] * v[2][k])
 }
 
-/// Mean over samples and channels of the squares; zero when there are none.
-pub(super) fn mean_of_squares(deviations: impl Iterator<Item = [f32; 3]>) -> f32 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for [r, g, b] in deviations {
-        sum += r * r + g * g + b * b;
-        count += 3.0;
+/// An estimated error, and how it is spread over a leaf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LeafError {
+    /// Mean square, in squared codes.
+    pub(super) mean_square: f32,
+    /// Share of the area that holds it, in (0, 1].
+    pub(super) spread: f32,
+}
+
+impl LeafError {
+    /// No error, anywhere.
+    pub(super) const NONE: Self = Self {
+        mean_square: 0.0,
+        spread: 1.0,
+    };
+
+    /// By deviations at evenly spread samples. The spread is the participation ratio `(sum e)^2 / (n sum e^2)` of the
+    /// squared deviations `e`: 1 when all are the same, `k / n` when `k` of `n` are and the others zero.
+    pub(super) fn of_samples(deviations: impl Iterator<Item = [f32; 3]>) -> Self {
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
+        for [r, g, b] in deviations {
+            let e = (r * r + g * g + b * b) / 3.0;
+            sum += e;
+            squares += e * e;
+            count += 1.0;
+        }
+        if squares > 0.0 {
+            Self {
+                mean_square: sum / count,
+                spread: sum * sum / (count * squares),
+            }
+        } else {
+            Self::NONE
+        }
     }
-    if count > 0.0 { sum / count } else { 0.0 }
 }

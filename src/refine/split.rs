@@ -1,7 +1,7 @@
 //! Splitting leaves along marked edges: planned, illuminated, then committed if it helps.
 
 use super::estimate::{deviations, mean_square};
-use super::forest::{Forest, LeafId, LeafState, NONE, Seedling, blend, mean_of_squares};
+use super::forest::{Forest, LeafError, LeafId, LeafState, NONE, Seedling, blend};
 use crate::geometry::{Bary, Vec3s};
 use crate::parallel::Exec;
 use crate::scene::World;
@@ -56,7 +56,7 @@ struct PlannedChild {
     points: [usize; 3],
     seedling: Seedling,
     /// Its estimated error once it exists.
-    error: f32,
+    error: LeafError,
     /// The parent's estimated error inside of it, at the same points.
     parent_error: f32,
 }
@@ -151,7 +151,7 @@ impl Forest {
                     .map(|child| child.seedling.pixels * error(child))
                     .sum::<f32>()
             };
-            if total(|child| child.error) >= total(|child| child.parent_error) {
+            if total(|child| child.error.mean_square) >= total(|child| child.parent_error) {
                 outcomes.push(SplitOutcome::Rejected {
                     leaf: split.initiator,
                     error: error_found(split.initiator, children),
@@ -287,7 +287,7 @@ impl Forest {
                 parent,
                 points,
                 seedling,
-                error: 0.0,
+                error: LeafError::NONE,
                 parent_error: 0.0,
             });
         }
@@ -343,8 +343,8 @@ impl Forest {
                 _ => self.vertices.surplus(parent_midpoints[point - 3]),
             });
             let at_edges = mean_square(corners, [deviation(0), deviation(1), deviation(2)]);
-            let inside = mean_of_squares((0..samples.len()).map(|i| deviation(3 + i)));
-            child.parent_error = at_edges.max(inside);
+            let inside = LeafError::of_samples((0..samples.len()).map(|i| deviation(3 + i)));
+            child.parent_error = at_edges.max(inside.mean_square);
             child.error = self.own_error(child.seedling.midpoints, samples.clone());
             next += 3 + samples.len();
         }

@@ -13,6 +13,7 @@
 //! that a budget in work units gives the same image for any number of threads.
 
 mod painting;
+mod parts;
 mod planning;
 mod ranking;
 
@@ -26,6 +27,7 @@ use crate::refine::estimate::Samples;
 use crate::refine::{Forest, LeafId, SplitOutcome};
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, RankedQueue};
+use parts::Part;
 use std::collections::VecDeque;
 
 /// Nominal nanoseconds between two looks at the clock.
@@ -50,6 +52,8 @@ enum Candidate {
     Root(u32),
     /// A leaf of the forest.
     Leaf(LeafId),
+    /// A part of a leaf, by its place in [`Refinement::parts`].
+    Part(u32),
 }
 
 /// A visible triangle.
@@ -89,11 +93,12 @@ enum Shading {
     PerPixel(ActiveLights, [[f32; 3]; 3]),
 }
 
-/// Whose pixels a patch belongs to.
+/// Who waits for a patch to be painted.
 #[derive(Clone, Copy, Debug)]
 enum Owner {
-    /// A root that is shaded as a whole.
-    Root,
+    /// Nobody: its pixels are right then.
+    Nobody,
+    /// A leaf, which then becomes a candidate for the next step.
     Leaf(LeafId),
 }
 
@@ -121,6 +126,9 @@ pub(super) struct Refinement {
     /// Place of a triangle in `roots`, for visible ones.
     root_of_triangle: Vec<u32>,
     paints: VecDeque<Paint>,
+    parts: Vec<Part>,
+    /// Parts whose samples have not been evaluated.
+    fresh_parts: usize,
     /// Triangles are shaded per pixel in the order of their area ([`Method::PhongArea`]).
     by_area: bool,
     /// By leaf.
@@ -154,6 +162,9 @@ impl Refinement {
         self.roots.clear();
         self.paints.clear();
         self.progressing.clear();
+        self.parts.clear();
+        self.samples.clear();
+        self.fresh_parts = 0;
         self.error_mass = 0.0;
         self.counters = Counters::default();
     }
@@ -199,6 +210,7 @@ impl Refinement {
         }
         if !self.by_area {
             self.sample_centroids(exec, world, view, base);
+            self.samples.clear();
         }
         for index in 0..self.roots.len() {
             let root = self.roots[index];
@@ -210,7 +222,6 @@ impl Refinement {
 
     /// Adds to the prior error of triangles what one true colour, at their centroids, has to say.
     fn sample_centroids(&mut self, exec: Exec, world: &World, view: &View, base: &BaseImage) {
-        self.samples.clear();
         let is_sampled = |root: &&mut Root| root.pixels >= PIXELS_FOR_CENTROID;
         for root in self.roots.iter_mut().filter(is_sampled) {
             let corners = world.triangles[root.triangle as usize].map(|v| v as usize);

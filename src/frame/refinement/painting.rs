@@ -69,6 +69,15 @@ impl Refinement {
         }
     }
 
+    /// What is still to be painted of a leaf.
+    pub(super) fn leaf_progress(&mut self, leaf: LeafId) -> &mut Progressing {
+        let index = leaf as usize;
+        if self.progressing.len() <= index {
+            self.progressing.resize(index + 1, Progressing::default());
+        }
+        &mut self.progressing[index]
+    }
+
     /// Puts a patch of about `pixels` pixels on the list, cut into quarters until each is small enough.
     pub(super) fn enqueue(&mut self, owner: Owner, patch: Patch, pixels: f32) {
         let units = match patch.fill {
@@ -84,11 +93,7 @@ impl Refinement {
             return;
         }
         if let Owner::Leaf(leaf) = owner {
-            let index = leaf as usize;
-            if self.progressing.len() <= index {
-                self.progressing.resize(index + 1, Progressing::default());
-            }
-            self.progressing[index].patches += 1;
+            self.leaf_progress(leaf).patches += 1;
         }
         self.paints.push_back(Paint {
             patch,

@@ -1,5 +1,6 @@
 //! Planning pieces: what to do with the best candidates.
 
+use super::parts::PART_PIXELS;
 use super::ranking::{self, Action};
 use super::{Candidate, Owner, PIECE_UNITS, Progress, Refinement, Shading, Stage, root_of};
 use crate::backend::{Fill, Patch};
@@ -44,6 +45,8 @@ impl Refinement {
         let pixels = match candidate {
             Candidate::Root(index) => self.roots[index as usize].pixels,
             Candidate::Leaf(leaf) => self.forest.leaf(leaf).pixels,
+            // Its samples have been paid for by its leaf.
+            Candidate::Part(_) => return cost::LEAF_NS as u64 / 4,
         };
         ranking::planning_cost(pixels, stage.world.lights.len()) as u64
     }
@@ -68,6 +71,10 @@ impl Refinement {
                 }
                 is_open
             }
+            Candidate::Part(part) => {
+                self.shade_part(stage, part);
+                true
+            }
         }
     }
 
@@ -91,6 +98,9 @@ impl Refinement {
             return self.deferred.push(Candidate::Leaf(leaf));
         }
         let marks = match self.choose(stage, leaf).1 {
+            Action::Shade if self.forest.leaf(leaf).pixels as f32 > 2.0 * PART_PIXELS => {
+                return self.cut_into_parts(stage, leaf);
+            }
             Action::Shade => return self.shade_leaf(stage, leaf),
             Action::Split(marks) => marks,
         };
@@ -136,6 +146,7 @@ impl Refinement {
             self.note_split(stage, split);
         }
         self.splits = splits;
+        self.rank_parts(stage);
     }
 
     fn note_planted(&mut self, stage: &Stage<'_>, leaf: LeafId) {
@@ -186,7 +197,7 @@ impl Refinement {
         let root = self.roots[index as usize];
         self.roots[index as usize].progress = Progress::Done;
         self.error_mass -= f64::from(root.pixels) * f64::from(root.prior);
-        self.shade_patch(stage, index, Owner::Root, Bary::ROOT, root.pixels);
+        self.shade_patch(stage, index, Bary::ROOT, root.pixels);
     }
 
     /// Has the pixels of a leaf shaded.
@@ -196,18 +207,11 @@ impl Refinement {
         let leaf = self.forest.leaf(id);
         let (corners, pixels) = (leaf.corners, leaf.pixels);
         if let Some(index) = self.root_of(leaf.triangle) {
-            self.shade_patch(stage, index, Owner::Leaf(id), corners, pixels);
+            self.shade_patch(stage, index, corners, pixels);
         }
     }
 
-    fn shade_patch(
-        &mut self,
-        stage: &Stage<'_>,
-        index: u32,
-        owner: Owner,
-        corners: [Bary; 3],
-        pixels: u32,
-    ) {
+    fn shade_patch(&mut self, stage: &Stage<'_>, index: u32, corners: [Bary; 3], pixels: u32) {
         let Shading::PerPixel(lights, remainder) = self.shading(stage, index) else {
             return;
         };
@@ -218,11 +222,11 @@ impl Refinement {
             fill: Fill::Phong { lights, remainder },
             pixels: 0,
         };
-        self.enqueue(owner, patch, pixels as f32);
+        self.enqueue(Owner::Nobody, patch, pixels as f32);
     }
 
     /// Which terms the pixels of a root need: by its bounds, if finding those costs less than they may save.
-    fn shading(&mut self, stage: &Stage<'_>, index: u32) -> Shading {
+    pub(super) fn shading(&mut self, stage: &Stage<'_>, index: u32) -> Shading {
         let root = self.roots[index as usize];
         if let Some(shading) = root.shading {
             return shading;
@@ -252,6 +256,7 @@ impl Refinement {
     fn offer(&mut self, stage: &Stage<'_>, candidate: Candidate) {
         match candidate {
             Candidate::Leaf(leaf) => self.offer_leaf(stage, leaf),
+            Candidate::Part(part) => self.offer_part(stage, part),
             Candidate::Root(index) => {
                 let root = self.roots[index as usize];
                 let (rank, _) = self.choose_for_root(&root, stage.world.lights.len());

@@ -8,6 +8,7 @@
 //!   that share a marked edge are repainted: they share benefit and cost.
 //! * *Shading per pixel*, after which no error is left.
 
+use super::parts::{PART_PIXELS, SAMPLES_PER_PART};
 use super::{Refinement, Root, Shading, Stage};
 use crate::geometry::Vec3s;
 use crate::refine::LeafId;
@@ -51,10 +52,17 @@ pub(super) fn prior_error(world: &World, colours: &Vec3s, triangle: u32, is_pht:
     contrast * contrast / 1024.0 + highlight + ERROR_FLOOR
 }
 
+/// The weighted sum of three vectors.
+pub(super) fn blend(weights: [f32; 3], v: [[f32; 3]; 3]) -> [f32; 3] {
+    std::array::from_fn(|k| weights[0] * v[0][k] + weights[1] * v[1][k] + weights[2] * v[2][k])
+}
+
 /// Nominal cost of taking up something of `pixels` pixels, before any pixel is painted.
 pub(super) fn planning_cost(pixels: u32, lights: usize) -> f32 {
-    let points = POINTS_PER_LEAF + sample_count(pixels) as f32;
-    cost::leaves(1.0, points, lights)
+    // It may come to be cut into parts: 4^k of them, each with samples of its own.
+    let samples =
+        sample_count(pixels).max(SAMPLES_PER_PART * pixels as usize / PART_PIXELS as usize);
+    cost::leaves(1.0, POINTS_PER_LEAF + samples as f32, lights)
 }
 
 impl Refinement {
@@ -83,15 +91,14 @@ impl Refinement {
         let error = leaf.error.max(ERROR_FLOOR);
         let pixels = leaf.pixels as f32;
 
-        let active = match self
-            .root_of(leaf.triangle)
-            .and_then(|i| self.roots[i as usize].shading)
-        {
-            Some(Shading::Proved) => 0,
-            Some(Shading::PerPixel(active, _)) => active.diffuse.len(),
-            None => lights,
+        // A large leaf is shaded part by part, those first that hold the error.
+        let active = self.active_lights(stage, leaf.triangle);
+        let share = if pixels > 2.0 * PART_PIXELS {
+            leaf.spread
+        } else {
+            1.0
         };
-        let shade = pixels * error / cost::phong(pixels, active);
+        let shade = pixels * error / cost::phong(pixels * share, active);
         if !leaf.splittable {
             return (shade, Action::Shade);
         }
@@ -119,6 +126,16 @@ impl Refinement {
             (split, Action::Split(marks))
         } else {
             (shade, Action::Shade)
+        }
+    }
+
+    /// How many lights a triangle's pixels are shaded under, as far as is known.
+    pub(super) fn active_lights(&self, stage: &Stage<'_>, triangle: u32) -> usize {
+        let root = self.root_of(triangle).map(|i| self.roots[i as usize]);
+        match root.and_then(|root| root.shading) {
+            Some(Shading::Proved) => 0,
+            Some(Shading::PerPixel(active, _)) => active.diffuse.len(),
+            None => stage.world.lights.len(),
         }
     }
 

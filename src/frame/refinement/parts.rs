@@ -1,0 +1,178 @@
+//! Shading a large leaf part by part.
+//!
+//! A highlight may take up little of a leaf. Before all of it is shaded per pixel, it is cut into parts of about
+//! [`PART_PIXELS`] pixels, each with an error of its own, estimated from a few samples. The parts become candidates; those
+//! with the highlight come soon, the others when their turn comes. Nothing is painted by cutting: until it is shaded, a
+//! part keeps the leaf's interpolated colours, and the leaf's edges are [pinned](crate::refine::Forest::pin), so that
+//! there is no seam to its neighbours.
+
+use super::{Candidate, Owner, Refinement, Shading, Stage, ranking};
+use crate::backend::{Fill, Patch};
+use crate::geometry::Bary;
+use crate::refine::LeafId;
+use crate::schedule::cost;
+
+/// A leaf of more than twice as many pixels is cut into parts of at most as many.
+pub(super) const PART_PIXELS: f32 = 256.0;
+
+/// Samples in a part: the centroids of its quarters.
+pub(super) const SAMPLES_PER_PART: usize = 4;
+
+/// A part of a leaf that is waiting to be shaded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Part {
+    leaf: LeafId,
+    corners: [Bary; 3],
+    /// Estimated.
+    pub(super) pixels: f32,
+    /// Estimated mean squared error.
+    error: f32,
+}
+
+impl Part {
+    /// Its share of the expected sum of squared errors.
+    fn mass(&self) -> f64 {
+        f64::from(self.pixels) * f64::from(self.error)
+    }
+}
+
+/// A triangle inside a root with interpolated colours at its corners.
+#[derive(Clone, Copy)]
+struct Piece {
+    corners: [Bary; 3],
+    colours: [[f32; 3]; 3],
+}
+
+impl Piece {
+    /// Its quarters, or `None` where the barycentric grid ends.
+    fn quarters(&self) -> Option<[Self; 4]> {
+        let [a, b, c] = self.corners;
+        let mid = [
+            Bary::midpoint(a, b)?,
+            Bary::midpoint(b, c)?,
+            Bary::midpoint(c, a)?,
+        ];
+        let [p, q, r] = self.colours;
+        let half = |u: [f32; 3], v: [f32; 3]| std::array::from_fn(|k| (u[k] + v[k]) * 0.5);
+        let (pq, qr, rp) = (half(p, q), half(q, r), half(r, p));
+        let piece = |corners, colours| Self { corners, colours };
+        Some([
+            piece([a, mid[0], mid[2]], [p, pq, rp]),
+            piece([mid[0], b, mid[1]], [pq, q, qr]),
+            piece([mid[2], mid[1], c], [rp, qr, r]),
+            piece([mid[0], mid[1], mid[2]], [pq, qr, rp]),
+        ])
+    }
+}
+
+impl Refinement {
+    /// Cuts an open leaf into parts; they are ranked by the next [`rank_parts`](Self::rank_parts).
+    pub(super) fn cut_into_parts(&mut self, stage: &Stage<'_>, id: LeafId) {
+        self.error_mass -= self.leaf_mass(id);
+        self.forest.pin(id);
+        let leaf = self.forest.leaf(id);
+        let (triangle, pixels) = (leaf.triangle, leaf.pixels as f32);
+        let whole = Piece {
+            corners: leaf.corners,
+            colours: self.forest.colours(stage.base.colours(), id),
+        };
+        let before = self.parts.len();
+        self.cut(stage, id, triangle, whole, pixels);
+        self.leaf_progress(id).patches = (self.parts.len() - before) as u32;
+    }
+
+    fn cut(&mut self, stage: &Stage<'_>, leaf: LeafId, triangle: u32, piece: Piece, pixels: f32) {
+        if pixels > PART_PIXELS
+            && let Some(quarters) = piece.quarters()
+        {
+            for quarter in quarters {
+                self.cut(stage, leaf, triangle, quarter, pixels * 0.25);
+            }
+            return;
+        }
+        self.parts.push(Part {
+            leaf,
+            corners: piece.corners,
+            pixels,
+            error: 0.0,
+        });
+        let world = stage.world;
+        let root = world.triangles[triangle as usize].map(|v| v as usize);
+        let positions = root.map(|v| world.positions.get(v));
+        let normals = root.map(|v| world.normals.get(v));
+        let corners = piece.corners.map(Bary::weights);
+        for weights in SAMPLE_WEIGHTS {
+            let in_root = ranking::blend(weights, corners);
+            self.samples.push(
+                ranking::blend(in_root, positions),
+                ranking::blend(in_root, normals),
+                world.triangle_material[triangle as usize],
+                ranking::blend(weights, piece.colours),
+            );
+        }
+    }
+
+    /// Evaluates the samples of parts that were cut since the last call, and makes the parts candidates.
+    pub(super) fn rank_parts(&mut self, stage: &Stage<'_>) {
+        if self.fresh_parts == self.parts.len() {
+            return;
+        }
+        self.samples
+            .illuminate(stage.exec, stage.world, stage.view.eye);
+        let fresh = std::mem::replace(&mut self.fresh_parts, self.parts.len());
+        for (order, index) in (fresh..self.parts.len()).enumerate() {
+            let first = order * SAMPLES_PER_PART;
+            let square = |sample| {
+                let [r, g, b] = self.samples.deviation(sample);
+                (r * r + g * g + b * b) / 3.0
+            };
+            let sum: f32 = (first..first + SAMPLES_PER_PART).map(square).sum();
+            self.parts[index].error = sum / SAMPLES_PER_PART as f32;
+            self.error_mass += self.parts[index].mass();
+            self.offer_part(stage, index as u32);
+        }
+        self.samples.clear();
+    }
+
+    /// Ranks a part and puts it on the queue.
+    pub(super) fn offer_part(&mut self, stage: &Stage<'_>, index: u32) {
+        let part = self.parts[index as usize];
+        let triangle = self.forest.leaf(part.leaf).triangle;
+        let active = self.active_lights(stage, triangle);
+        let benefit = part.pixels * part.error.max(ranking::ERROR_FLOOR);
+        let rank = benefit / cost::phong(part.pixels, active);
+        self.queue.push(rank, Candidate::Part(index));
+    }
+
+    /// Has the pixels of a part shaded. The last part closes the leaf.
+    pub(super) fn shade_part(&mut self, stage: &Stage<'_>, index: u32) {
+        let part = self.parts[index as usize];
+        self.error_mass -= part.mass();
+        let triangle = self.forest.leaf(part.leaf).triangle;
+        if let Some(root) = self.root_of(triangle)
+            && let Shading::PerPixel(lights, remainder) = self.shading(stage, root)
+        {
+            self.mark_refined(root, false);
+            let patch = Patch {
+                triangle,
+                corners: part.corners,
+                fill: Fill::Phong { lights, remainder },
+                pixels: 0,
+            };
+            self.enqueue(Owner::Nobody, patch, part.pixels);
+        }
+        let progress = self.leaf_progress(part.leaf);
+        progress.patches -= 1;
+        if progress.patches == 0 {
+            self.forest.close(stage.world, part.leaf);
+        }
+    }
+}
+
+/// The centroids of a triangle's quarters.
+const SAMPLE_WEIGHTS: [[f32; 3]; SAMPLES_PER_PART] = [
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+];
