@@ -306,7 +306,8 @@ impl Renderer {
         };
         loop {
             let pending = stage.backend.pending_pixels(frame);
-            allowance.reserve_ms(f64::from(cost::present(pending)) * 1e-6);
+            let threads = exec.threads as f64;
+            allowance.reserve_ms(f64::from(cost::present(pending)) * 1e-6 / threads);
             if !self.refinement.step(&mut stage, allowance) {
                 break;
             }

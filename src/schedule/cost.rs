@@ -11,6 +11,8 @@ pub const VERTEX_NS: f32 = 0.9;
 pub const VERTEX_LIGHT_NS: f32 = 0.9;
 /// Making a leaf, as a root or by a split: edges, midpoints, estimate and bookkeeping, without illumination.
 pub const LEAF_NS: f32 = 400.0;
+/// Taking a sample inside a leaf, without its illumination.
+pub const SAMPLE_NS: f32 = 40.0;
 /// Repainting a patch with interpolated colours: a fixed part, and a part for each pixel.
 pub const REPAINT_NS: f32 = 280.0;
 /// See [`REPAINT_NS`].
@@ -39,6 +41,12 @@ pub fn vertices(vertices: f32, lights: usize) -> f32 {
 #[must_use]
 pub fn leaves(leaves: f32, points: f32, lights: usize) -> f32 {
     leaves * (LEAF_NS + vertices(points, lights))
+}
+
+/// Taking `count` samples under `lights` lights.
+#[must_use]
+pub fn samples(count: usize, lights: usize) -> f32 {
+    count as f32 * SAMPLE_NS + vertices(count as f32, lights)
 }
 
 /// Repainting `patches` patches of `pixels` pixels altogether.

@@ -1,10 +1,10 @@
 //! Shading a large leaf part by part.
 //!
-//! A highlight may take up little of a leaf. Before all of it is shaded per pixel, it is cut into parts of about
-//! [`PART_PIXELS`] pixels, each with an error of its own, estimated from a few samples. The parts become candidates; those
-//! with the highlight come soon, the others when their turn comes. Nothing is painted by cutting: until it is shaded, a
-//! part keeps the leaf's interpolated colours, and the leaf's edges are [pinned](crate::refine::Forest::pin), so that
-//! there is no seam to its neighbours.
+//! A highlight may take up little of a leaf. Before all of it is shaded per pixel, it is cut into up to [`CUT`] parts, each
+//! with an error of its own, estimated from a few samples. The parts become candidates; those with the highlight come
+//! soon, and are cut again while they are large, the others when their turn comes. Nothing is painted by cutting: until
+//! it is shaded, a part keeps the leaf's interpolated colours, and the leaf's edges are
+//! [pinned](crate::refine::Forest::pin), so that there is no seam to its neighbours.
 
 use super::{Candidate, Owner, Refinement, Shading, Stage, ranking};
 use crate::backend::{Fill, Patch};
@@ -12,17 +12,25 @@ use crate::geometry::Bary;
 use crate::refine::LeafId;
 use crate::schedule::cost;
 
-/// A leaf of more than twice as many pixels is cut into parts of at most as many.
-pub(super) const PART_PIXELS: f32 = 256.0;
+/// A leaf or part of more than twice as many pixels is cut rather than shaded, but not into parts of fewer.
+const PART_PIXELS: f32 = 256.0;
+
+/// Most parts that are made at once, a power of four.
+pub(super) const CUT: usize = 16;
 
 /// Samples in a part: the centroids of its quarters.
 pub(super) const SAMPLES_PER_PART: usize = 4;
+
+/// Whether something of so many pixels is cut rather than shaded.
+pub(super) fn is_large(pixels: f32) -> bool {
+    pixels > 2.0 * PART_PIXELS
+}
 
 /// A part of a leaf that is waiting to be shaded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
     leaf: LeafId,
-    corners: [Bary; 3],
+    piece: Piece,
     /// Estimated.
     pub(super) pixels: f32,
     /// Estimated mean squared error.
@@ -37,7 +45,7 @@ impl Part {
 }
 
 /// A triangle inside a root with interpolated colours at its corners.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Piece {
     corners: [Bary; 3],
     colours: [[f32; 3]; 3],
@@ -66,7 +74,7 @@ impl Piece {
 }
 
 impl Refinement {
-    /// Cuts an open leaf into parts; they are ranked by the next [`rank_parts`](Self::rank_parts).
+    /// Cuts an open leaf into parts, which the next [`rank_parts`](Self::rank_parts) makes candidates.
     pub(super) fn cut_into_parts(&mut self, stage: &Stage<'_>, id: LeafId) {
         self.error_mass -= self.leaf_mass(id);
         self.forest.pin(id);
@@ -76,23 +84,50 @@ impl Refinement {
             corners: leaf.corners,
             colours: self.forest.colours(stage.base.colours(), id),
         };
-        let before = self.parts.len();
-        self.cut(stage, id, triangle, whole, pixels);
-        self.leaf_progress(id).patches = (self.parts.len() - before) as u32;
+        let parts = self.cut(stage, id, triangle, whole, pixels, CUT);
+        self.leaf_progress(id).patches = parts;
     }
 
-    fn cut(&mut self, stage: &Stage<'_>, leaf: LeafId, triangle: u32, piece: Piece, pixels: f32) {
-        if pixels > PART_PIXELS
+    /// Takes a part up: cuts it again, or has its pixels shaded.
+    pub(super) fn plan_part(&mut self, stage: &Stage<'_>, index: u32) {
+        let part = self.parts[index as usize];
+        self.error_mass -= part.mass();
+        let triangle = self.forest.leaf(part.leaf).triangle;
+        if is_large(part.pixels) && part.piece.quarters().is_some() {
+            let parts = self.cut(stage, part.leaf, triangle, part.piece, part.pixels, CUT);
+            self.leaf_progress(part.leaf).patches += parts;
+        } else {
+            self.shade_part(stage, &part, triangle);
+        }
+        let progress = self.leaf_progress(part.leaf);
+        progress.patches -= 1;
+        if progress.patches == 0 {
+            self.forest.close(stage.world, part.leaf);
+        }
+    }
+
+    /// Cuts a piece into at most `most` parts with samples, and counts them.
+    fn cut(
+        &mut self,
+        stage: &Stage<'_>,
+        leaf: LeafId,
+        triangle: u32,
+        piece: Piece,
+        pixels: f32,
+        most: usize,
+    ) -> u32 {
+        if most > 1
+            && pixels > PART_PIXELS
             && let Some(quarters) = piece.quarters()
         {
-            for quarter in quarters {
-                self.cut(stage, leaf, triangle, quarter, pixels * 0.25);
-            }
-            return;
+            let quarters = quarters.into_iter();
+            return quarters
+                .map(|quarter| self.cut(stage, leaf, triangle, quarter, pixels * 0.25, most / 4))
+                .sum();
         }
         self.parts.push(Part {
             leaf,
-            corners: piece.corners,
+            piece,
             pixels,
             error: 0.0,
         });
@@ -110,9 +145,10 @@ impl Refinement {
                 ranking::blend(weights, piece.colours),
             );
         }
+        1
     }
 
-    /// Evaluates the samples of parts that were cut since the last call, and makes the parts candidates.
+    /// Evaluates the samples of parts made since the last call, and makes the parts candidates.
     pub(super) fn rank_parts(&mut self, stage: &Stage<'_>) {
         if self.fresh_parts == self.parts.len() {
             return;
@@ -144,27 +180,18 @@ impl Refinement {
         self.queue.push(rank, Candidate::Part(index));
     }
 
-    /// Has the pixels of a part shaded. The last part closes the leaf.
-    pub(super) fn shade_part(&mut self, stage: &Stage<'_>, index: u32) {
-        let part = self.parts[index as usize];
-        self.error_mass -= part.mass();
-        let triangle = self.forest.leaf(part.leaf).triangle;
+    fn shade_part(&mut self, stage: &Stage<'_>, part: &Part, triangle: u32) {
         if let Some(root) = self.root_of(triangle)
             && let Shading::PerPixel(lights, remainder) = self.shading(stage, root)
         {
             self.mark_refined(root, false);
             let patch = Patch {
                 triangle,
-                corners: part.corners,
+                corners: part.piece.corners,
                 fill: Fill::Phong { lights, remainder },
                 pixels: 0,
             };
             self.enqueue(Owner::Nobody, patch, part.pixels);
-        }
-        let progress = self.leaf_progress(part.leaf);
-        progress.patches -= 1;
-        if progress.patches == 0 {
-            self.forest.close(stage.world, part.leaf);
         }
     }
 }

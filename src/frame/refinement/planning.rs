@@ -1,6 +1,6 @@
 //! Planning pieces: what to do with the best candidates.
 
-use super::parts::PART_PIXELS;
+use super::parts;
 use super::ranking::{self, Action};
 use super::{Candidate, Owner, PIECE_UNITS, Progress, Refinement, Shading, Stage, root_of};
 use crate::backend::{Fill, Patch};
@@ -42,13 +42,21 @@ impl Refinement {
     }
 
     fn planning_cost(&self, stage: &Stage<'_>, candidate: Candidate) -> u64 {
-        let pixels = match candidate {
-            Candidate::Root(index) => self.roots[index as usize].pixels,
-            Candidate::Leaf(leaf) => self.forest.leaf(leaf).pixels,
-            // Its samples have been paid for by its leaf.
-            Candidate::Part(_) => return cost::LEAF_NS as u64 / 4,
+        let lights = stage.world.lights.len();
+        let units = match candidate {
+            Candidate::Root(index) => {
+                ranking::planting_cost(self.roots[index as usize].pixels, lights)
+            }
+            Candidate::Leaf(leaf) => {
+                let pixels = self.forest.leaf(leaf).pixels;
+                ranking::planting_cost(pixels, lights)
+                    + ranking::cutting_cost(pixels as f32, lights)
+            }
+            Candidate::Part(part) => {
+                ranking::cutting_cost(self.parts[part as usize].pixels, lights)
+            }
         };
-        ranking::planning_cost(pixels, stage.world.lights.len()) as u64
+        units as u64
     }
 
     /// Takes a candidate up. False when it has become void.
@@ -72,7 +80,7 @@ impl Refinement {
                 is_open
             }
             Candidate::Part(part) => {
-                self.shade_part(stage, part);
+                self.plan_part(stage, part);
                 true
             }
         }
@@ -98,7 +106,7 @@ impl Refinement {
             return self.deferred.push(Candidate::Leaf(leaf));
         }
         let marks = match self.choose(stage, leaf).1 {
-            Action::Shade if self.forest.leaf(leaf).pixels as f32 > 2.0 * PART_PIXELS => {
+            Action::Shade if parts::is_large(self.forest.leaf(leaf).pixels as f32) => {
                 return self.cut_into_parts(stage, leaf);
             }
             Action::Shade => return self.shade_leaf(stage, leaf),

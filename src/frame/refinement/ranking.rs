@@ -8,7 +8,7 @@
 //!   that share a marked edge are repainted: they share benefit and cost.
 //! * *Shading per pixel*, after which no error is left.
 
-use super::parts::{PART_PIXELS, SAMPLES_PER_PART};
+use super::parts::{self, CUT, SAMPLES_PER_PART};
 use super::{Refinement, Root, Shading, Stage};
 use crate::geometry::Vec3s;
 use crate::refine::LeafId;
@@ -57,12 +57,18 @@ pub(super) fn blend(weights: [f32; 3], v: [[f32; 3]; 3]) -> [f32; 3] {
     std::array::from_fn(|k| weights[0] * v[0][k] + weights[1] * v[1][k] + weights[2] * v[2][k])
 }
 
-/// Nominal cost of taking up something of `pixels` pixels, before any pixel is painted.
-pub(super) fn planning_cost(pixels: u32, lights: usize) -> f32 {
-    // It may come to be cut into parts: 4^k of them, each with samples of its own.
-    let samples =
-        sample_count(pixels).max(SAMPLES_PER_PART * pixels as usize / PART_PIXELS as usize);
-    cost::leaves(1.0, POINTS_PER_LEAF + samples as f32, lights)
+/// Nominal cost of making a triangle or leaf of `pixels` pixels a leaf that can be split.
+pub(super) fn planting_cost(pixels: u32, lights: usize) -> f32 {
+    cost::leaves(1.0, POINTS_PER_LEAF, lights) + cost::samples(sample_count(pixels), lights)
+}
+
+/// Nominal cost of cutting a leaf or part of `pixels` pixels into parts, or of putting it on the list if it is small.
+pub(super) fn cutting_cost(pixels: f32, lights: usize) -> f32 {
+    if parts::is_large(pixels) {
+        cost::samples(CUT * SAMPLES_PER_PART, lights)
+    } else {
+        cost::SAMPLE_NS
+    }
 }
 
 impl Refinement {
@@ -75,7 +81,7 @@ impl Refinement {
         }
         let benefit = pixels * root.prior;
         let shade = benefit / cost::phong(pixels, lights);
-        let planting = planning_cost(root.pixels, lights);
+        let planting = planting_cost(root.pixels, lights);
         let split = benefit * (15.0 / 16.0) / (planting + split_cost(pixels, 3, lights));
         if split > shade {
             (split, Action::Split(7))
@@ -93,12 +99,13 @@ impl Refinement {
 
         // A large leaf is shaded part by part, those first that hold the error.
         let active = self.active_lights(stage, leaf.triangle);
-        let share = if pixels > 2.0 * PART_PIXELS {
+        let share = if parts::is_large(pixels) {
             leaf.spread
         } else {
             1.0
         };
-        let shade = pixels * error / cost::phong(pixels * share, active);
+        let shade_cost = cutting_cost(pixels, lights) + cost::phong(pixels * share, active);
+        let shade = pixels * error / shade_cost;
         if !leaf.splittable {
             return (shade, Action::Shade);
         }
