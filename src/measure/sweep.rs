@@ -279,6 +279,9 @@ impl<'a> Sweep<'a> {
         budgets: &[SweepBudget],
         mut on_row: impl FnMut(SweepRow) -> ControlFlow<()>,
     ) {
+        for method in 0..self.engines.len() {
+            self.warm_up(method);
+        }
         for &budget in budgets {
             for method in 0..self.engines.len() {
                 for row in self.measure(method, budget) {
@@ -318,6 +321,17 @@ impl<'a> Sweep<'a> {
             .collect()
     }
 
+    /// Touches all memory an engine will need, and lets the operating system spread its new threads over the processors,
+    /// which takes it some tens of milliseconds.
+    fn warm_up(&mut self, method: usize) {
+        let engine = &mut self.engines[method];
+        engine.render(self.scene, Budget::Unlimited, &mut self.frame);
+        for _ in 0..WARM_UP_FRAMES {
+            engine.forget();
+            engine.render(self.scene, Budget::from_millis(0.0), &mut self.frame);
+        }
+    }
+
     fn render(&mut self, method: usize, budget: SweepBudget, start: Start) -> FrameStats {
         let engine = &mut self.engines[method];
         if start == Start::Cold {
@@ -347,6 +361,9 @@ impl<'a> Sweep<'a> {
         }
     }
 }
+
+/// First images that each engine draws before the first measured row.
+const WARM_UP_FRAMES: usize = 20;
 
 /// How a frame starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
