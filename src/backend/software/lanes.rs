@@ -53,8 +53,19 @@ pub(super) fn select3<S: Simd>(mask: S::mask32s, a: Lanes3<S>, b: Lanes3<S>) -> 
 #[inline(always)]
 pub(super) fn weights<S: Simd>(simd: S, planes: &Interpolator, x: i32, y: i32) -> Lanes3<S> {
     let iota = S::i32s::from_fn(simd, |i| i as i32);
-    let dx: S::f32s = (iota + (x - planes.anchor[0])).to_float();
+    let dx = (iota + (x - planes.anchor[0])).to_float();
     let dy = S::f32s::splat(simd, (y - planes.anchor[1]) as f32);
+    weights_at(simd, planes, dx, dy)
+}
+
+/// The weights of a triangle's corners at any pixels, given as whole numbers of pixels to the right of the anchor and down.
+#[inline(always)]
+pub(super) fn weights_at<S: Simd>(
+    simd: S,
+    planes: &Interpolator,
+    dx: S::f32s,
+    dy: S::f32s,
+) -> Lanes3<S> {
     let zero = S::f32s::splat(simd, 0.0);
     let mut e = [zero; 3];
     for (i, e) in e.iter_mut().enumerate() {

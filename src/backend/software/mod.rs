@@ -16,6 +16,7 @@
 //! image to image.
 
 mod lanes;
+mod patch;
 mod present;
 mod raster;
 mod repaint;

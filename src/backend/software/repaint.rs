@@ -1,41 +1,37 @@
 //! Painting parts of triangles anew: exactly the pixels that a triangle owns inside a patch of it.
 //!
-//! **Who owns a pixel.** A pixel's barycentric coordinates `(b1, b2)` in the root triangle are rounded to a grid of `2^-16`,
-//! half as wide as that of the patches' corners, and moved off the root's border: `b1, b2 >= 1`, `b1 + b2 <= 2^16 - 1`
-//! in grid units. Then an integer edge function decides on which side of each edge of the patch the point lies; the top-left rule, here
-//! in the `(b1, b2)` plane, decides on the edges. It amounts to moving every point by one and the same infinitesimal step, and no point
-//! is on the root's border, so any patches that partition the root own each pixel exactly once, whether or not
-//! they meet edge to edge. (Points on the border could not be shared out by a rule that knows one patch at a time.)
+//! [`patch`](super::patch) says which pixels those are and where to look for them.
 //!
-//! **Exactness.** An edge function is twice the area of the triangle of the edge and the point, in units of `2^-15` by `2^-16`.
-//! All three lie in the root, the point strictly, so it is smaller in magnitude than the root's `2^31`; and `i32` arithmetic, which
-//! wraps, is exact whenever the result fits, bias of the top-left rule included.
-//!
-//! **Where to look.** A patch is sought in the box of its projection, widened in barycentric coordinates by the triangle's
-//! [`slack`](super::visible::VisibleTriangle::slack), and in all that its triangle may own where that says nothing.
+//! **Full vectors.** A row of a small patch has few pixels, and colours are dear. So a batch of pixels that may belong to the patch
+//! is collected from all its rows first, one behind the other without gaps; then weights, the test of
+//! ownership, colours and encoding run on full vectors; then the colours go back to where the pixels came from. What a lane
+//! gets does not depend on its neighbours, hence not on the width of vectors.
 //!
 //! The work is a list of jobs, a patch in a tile each, sorted by tile and split between tiles.
 
-use super::lanes::{Corners3, Lanes3, gather, interpolate, weights};
+use super::lanes::{Corners3, Lanes3, gather, interpolate, weights_at};
+use super::patch::{MAX_LANES, PatchEdges, Rows, patch_bounds};
 use super::resolve::Painter;
 use super::setup::corners;
 use super::tile::{Bounds, Grid, TILE_SIDE, Tile};
 use super::transform::Vertices;
-use super::visible::VisibleTriangle;
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
+use crate::geometry::screen::Interpolator;
 use crate::illumination::{ActiveLights, ShadingKit, shade_lanes};
-use crate::math::PixelPoint;
 use crate::output::encode::encode_lanes;
 use crate::parallel::Exec;
 use crate::simd::{Simd, dispatch};
-use fearless_simd::{Select, SimdBase, SimdFloat, SimdMask};
+use fearless_simd::{Bytes, Select, SimdBase, SimdFloat, SimdInt, SimdMask};
 
 /// Jobs are not split into fewer than these.
 const JOBS_PER_TASK: usize = 4;
 
-/// Where 1 lies on the grid of pixels' barycentric coordinates.
-const GRID_UNIT: i32 = 2 * Bary::UNIT as i32;
+/// Pixels of a batch, at most: as many as keep it in the first-level cache, cheap to clear.
+const BATCH: usize = 256;
+
+/// The colour of a pixel of a batch that does not belong to the patch. Painted ones are opaque.
+const NOT_PAINTED: u32 = 0;
 
 /// A patch in a tile.
 #[derive(Clone, Copy, Debug)]
@@ -79,51 +75,6 @@ pub(super) fn plan(
     jobs.sort_unstable_by_key(|job| (job.tile, job.patch));
 }
 
-/// A box that holds all pixels of a patch.
-fn patch_bounds(
-    owner: &VisibleTriangle,
-    corners: impl FnOnce() -> [PixelPoint; 3],
-    patch: &[Bary; 3],
-) -> Option<Bounds> {
-    if *patch == Bary::ROOT || owner.slack == f32::INFINITY {
-        return Some(owner.bounds);
-    }
-    let corners = corners();
-    let slack = f64::from(owner.slack);
-    let mut min = [f64::INFINITY; 2];
-    let mut max = [f64::NEG_INFINITY; 2];
-    for corner in patch {
-        let [_, b1, b2] = corner.weights().map(f64::from);
-        for (d1, d2) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
-            let (b1, b2) = (b1 + d1 * slack, b2 + d2 * slack);
-            let weights = [1.0 - b1 - b2, b1, b2];
-            let at = |k: usize| -> f64 { (0..3).map(|i| weights[i] * corners[i][k]).sum() };
-            let w = at(3);
-            if w <= 0.0 {
-                return Some(owner.bounds);
-            }
-            for axis in 0..2 {
-                let position = at(axis) / w;
-                min[axis] = min[axis].min(position);
-                max[axis] = max[axis].max(position);
-            }
-        }
-    }
-    // The pixels whose centres lie inside, with a margin for rounding. The conversion saturates.
-    let first = min.map(|v| (v - 0.5 - 1.0 / 256.0).ceil().max(0.0) as u16);
-    let last = max.map(|v| (v - 0.5 + 1.0 / 256.0).floor());
-    if last[0] < 0.0 || last[1] < 0.0 {
-        return None;
-    }
-    let bounds = Bounds {
-        x0: owner.bounds.x0.max(first[0]),
-        y0: owner.bounds.y0.max(first[1]),
-        x1: owner.bounds.x1.min(last[0] as u16),
-        y1: owner.bounds.y1.min(last[1] as u16),
-    };
-    (bounds.x0 <= bounds.x1 && bounds.y0 <= bounds.y1).then_some(bounds)
-}
-
 /// Does all jobs; each tile's stay together.
 pub(super) fn run(
     exec: Exec,
@@ -147,9 +98,10 @@ fn run_from(
     let ends = [jobs.first(), jobs.last()].map(|job| job.map(|job| job.tile));
     if exec.threads < 2 || jobs.len() <= JOBS_PER_TASK || ends[0] == ends[1] {
         dispatch!(exec.level, simd => {
+            let work = &mut Workspace::new();
             for job in jobs {
                 let tile = &mut tiles[job.tile as usize - first];
-                job.pixels = paint_job(simd, tile, job, painter, &patches[job.patch as usize]);
+                job.pixels = paint_job(simd, tile, job, painter, &patches[job.patch as usize], work);
             }
         });
         return;
@@ -177,6 +129,22 @@ fn run_from(
     );
 }
 
+/// Memory of one thread, used for one job after the other.
+#[derive(Clone, Debug)]
+struct Workspace {
+    rows: Rows,
+    batch: Batch,
+}
+
+impl Workspace {
+    fn new() -> Self {
+        Self {
+            rows: Rows::new(),
+            batch: Batch::new(),
+        }
+    }
+}
+
 /// Paints a patch's pixels in a tile and counts them.
 #[inline(always)]
 fn paint_job<S: Simd>(
@@ -185,12 +153,13 @@ fn paint_job<S: Simd>(
     job: &Job,
     painter: &Painter<'_>,
     patch: &Patch,
+    work: &mut Workspace,
 ) -> u32 {
     let world = painter.geometry.world;
     match patch.fill {
         Fill::Gouraud(colors) => {
             let fill = GouraudFill::new(patch.corners, colors);
-            paint_patch(simd, tile, job, painter, patch, &fill)
+            paint_patch(simd, tile, job, painter, patch, &fill, work)
         }
         Fill::Phong { lights, remainder } => {
             let triangle = world.triangles[patch.triangle as usize];
@@ -201,7 +170,7 @@ fn paint_job<S: Simd>(
                 normals: gather(&world.normals, triangle),
                 remainder,
             };
-            paint_patch(simd, tile, job, painter, patch, &fill)
+            paint_patch(simd, tile, job, painter, patch, &fill, work)
         }
     }
 }
@@ -214,37 +183,24 @@ fn paint_patch<S: Simd>(
     painter: &Painter<'_>,
     patch: &Patch,
     fill: &impl PatchFill,
+    work: &mut Workspace,
 ) -> u32 {
-    let lanes = S::u32s::LEN;
     let owner = painter.visible.owner(patch.triangle);
-    let inside = (patch.corners != Bary::ROOT).then(|| PatchEdges::new(patch.corners));
+    let edges = (patch.corners != Bary::ROOT).then(|| PatchEdges::new(patch.corners));
     let pixels = job.bounds.within(tile.origin);
-    let first = pixels.x0 as usize & !(lanes - 1);
+    work.rows.find(simd, tile, pixels, owner, edges.as_ref());
+    let mut place = Place {
+        x: work.rows.first[pixels.y0 as usize],
+        y: pixels.y0,
+        last_y: pixels.y1,
+    };
     let mut painted = 0;
     let mut changed = S::mask32s::splat(simd, false);
-    for y in pixels.y0..=pixels.y1 {
-        for x in (first..=pixels.x1 as usize).step_by(lanes) {
-            let at = y as usize * TILE_SIDE + x;
-            let ids = S::u32s::from_slice(simd, &tile.id[at..at + lanes]);
-            let mut mask = ids.simd_eq(patch.triangle);
-            if !mask.any_true() {
-                continue;
-            }
-            let pixel = [tile.origin[0] + x as i32, tile.origin[1] + y];
-            let w = weights(simd, &owner.planes, pixel[0], pixel[1]);
-            if let Some(edges) = &inside {
-                mask &= edges.contain(simd, w);
-                if !mask.any_true() {
-                    continue;
-                }
-            }
-            painted += mask.to_bitmask().count_ones();
-            let stored = S::u32s::from_slice(simd, &tile.color[at..at + lanes]);
-            let color = encode_lanes(simd, fill.colors(simd, w));
-            let color = mask.select(color, stored);
-            changed |= color.simd_ne(stored);
-            color.store_slice(&mut tile.color[at..at + lanes]);
-        }
+    while place.y <= place.last_y {
+        let batch = &mut work.batch;
+        batch.collect(simd, tile, patch.triangle, &work.rows, &mut place);
+        painted += batch.color(simd, tile.origin, &owner.planes, edges.as_ref(), fill);
+        changed |= batch.put_back(simd, tile);
     }
     if changed.any_true() {
         tile.serial = painter.serial;
@@ -252,45 +208,146 @@ fn paint_patch<S: Simd>(
     painted
 }
 
-/// The edges of a patch as `a b1 + b b2 + c >= 0` on the grid of pixels' barycentric coordinates, the top-left rule
-/// folded into `c`.
+/// How far a patch has been searched for pixels.
 #[derive(Clone, Copy, Debug)]
-struct PatchEdges([[i32; 3]; 3]);
-
-impl PatchEdges {
-    fn new(corners: [Bary; 3]) -> Self {
-        let edge = |i: usize| {
-            let [p, q] = [corners[i], corners[(i + 1) % 3]];
-            let [p1, p2, q1, q2] = [p.b1, p.b2, q.b1, q.b2].map(i64::from);
-            let (dx, dy) = (q1 - p1, q2 - p2);
-            let top_left = dy < 0 || (dy == 0 && dx > 0);
-            // Twice: the pixels' grid is half as wide.
-            let c = 2 * (dy * p1 - dx * p2) - i64::from(!top_left);
-            // Only the low 32 bits matter, since the values of the edge function fit.
-            [-dy as i32, dx as i32, c as i32]
-        };
-        Self([edge(0), edge(1), edge(2)])
-    }
-
-    /// Which pixels with these weights belong to the patch.
-    #[inline(always)]
-    fn contain<S: Simd>(&self, simd: S, w: Lanes3<S>) -> S::mask32s {
-        let one = S::i32s::splat(simd, 1);
-        let b1 = on_grid::<S>(w[1]).max(one).min(GRID_UNIT - 2);
-        let most = S::i32s::splat(simd, GRID_UNIT - 1) - b1;
-        let b2 = on_grid::<S>(w[2]).max(one).min(most);
-        let mut signs = S::i32s::splat(simd, 0);
-        for [a, b, c] in self.0 {
-            signs |= b1 * a + b2 * b + c;
-        }
-        signs.simd_ge(0)
-    }
+struct Place {
+    /// The next column.
+    x: i32,
+    /// The row.
+    y: i32,
+    /// The last row.
+    last_y: i32,
 }
 
-/// A weight rounded to the grid.
-#[inline(always)]
-fn on_grid<S: Simd>(weight: S::f32s) -> S::i32s {
-    (weight * GRID_UNIT as f32 + 0.5).to_int()
+/// Some lanes of consecutive pixels of a row.
+#[derive(Clone, Copy, Debug, Default)]
+struct Chunk {
+    /// Index of the first pixel in the tile.
+    at: u16,
+    /// One bit for each lane.
+    lanes: u16,
+}
+
+/// Pixels of a tile that may belong to a patch.
+#[derive(Clone, Debug)]
+struct Batch {
+    /// Where they are.
+    chunks: [Chunk; BATCH],
+    chunks_len: usize,
+    /// Their indices in the tile, chunk after chunk.
+    index: [u32; BATCH + MAX_LANES],
+    len: usize,
+    /// Their encoded colours, or [`NOT_PAINTED`].
+    color: [u32; BATCH + MAX_LANES],
+}
+
+impl Batch {
+    fn new() -> Self {
+        Self {
+            chunks: [Chunk::default(); BATCH],
+            chunks_len: 0,
+            index: [0; BATCH + MAX_LANES],
+            len: 0,
+            color: [NOT_PAINTED; BATCH + MAX_LANES],
+        }
+    }
+
+    /// Starts anew with the triangle's next pixels, until there are no more or the batch is full.
+    #[inline(always)]
+    fn collect<S: Simd>(
+        &mut self,
+        simd: S,
+        tile: &Tile,
+        triangle: u32,
+        rows: &Rows,
+        place: &mut Place,
+    ) {
+        let lanes = S::u32s::LEN;
+        let iota = S::u32s::from_fn(simd, |i| i as u32);
+        let triangle = S::u32s::splat(simd, triangle);
+        let (mut len, mut chunks_len) = (0, 0);
+        'rows: while place.y <= place.last_y {
+            let last = rows.last[place.y as usize];
+            while place.x <= last {
+                if len + lanes > BATCH {
+                    break 'rows;
+                }
+                // A vector stays in its row, so it may have to start early; what it has seen already is left out.
+                let start = place.x.min((TILE_SIDE - lanes) as i32);
+                let at = place.y as usize * TILE_SIDE + start as usize;
+                let ids = S::u32s::from_slice(simd, &tile.id[at..at + lanes]);
+                // Wraps in front of the place, so that one comparison does for both ends.
+                let column = iota - (place.x - start) as u32;
+                let mask = ids.simd_eq(triangle) & column.simd_le((last - place.x) as u32);
+                let bits = mask.to_bitmask();
+                if bits != 0 {
+                    let index = (iota + at as u32).compress(mask);
+                    index.store_slice(&mut self.index[len..len + lanes]);
+                    self.chunks[chunks_len] = Chunk {
+                        at: at as u16,
+                        lanes: bits as u16,
+                    };
+                    chunks_len += 1;
+                    len += bits.count_ones() as usize;
+                }
+                place.x = start + lanes as i32;
+            }
+            place.y += 1;
+            place.x = rows.first[place.y as usize];
+        }
+        (self.len, self.chunks_len) = (len, chunks_len);
+    }
+
+    /// Colours the pixels that belong to the patch, and counts them.
+    #[inline(always)]
+    fn color<S: Simd>(
+        &mut self,
+        simd: S,
+        origin: [i32; 2],
+        planes: &Interpolator,
+        edges: Option<&PatchEdges>,
+        fill: &impl PatchFill,
+    ) -> u32 {
+        let lanes = S::u32s::LEN;
+        let offset = [origin[0] - planes.anchor[0], origin[1] - planes.anchor[1]];
+        let iota = S::i32s::from_fn(simd, |i| i as i32);
+        let mut painted = 0;
+        for at in (0..self.len).step_by(lanes) {
+            let index = S::u32s::from_slice(simd, &self.index[at..at + lanes]);
+            let index: S::i32s = index.bitcast();
+            let dx = ((index & (TILE_SIDE as i32 - 1)) + offset[0]).to_float();
+            let dy = ((index >> TILE_SIDE.trailing_zeros()) + offset[1]).to_float();
+            let w = weights_at(simd, planes, dx, dy);
+            let mut mask = iota.simd_lt((self.len - at) as i32);
+            if let Some(edges) = edges {
+                mask &= edges.signs(simd, w).simd_ge(0);
+            }
+            painted += mask.to_bitmask().count_ones();
+            let color = encode_lanes(simd, fill.colors(simd, w));
+            let color = mask.select(color, S::u32s::splat(simd, NOT_PAINTED));
+            color.store_slice(&mut self.color[at..at + lanes]);
+        }
+        painted
+    }
+
+    /// Paints the tile and says where that changed it.
+    #[inline(always)]
+    fn put_back<S: Simd>(&self, simd: S, tile: &mut Tile) -> S::mask32s {
+        let lanes = S::u32s::LEN;
+        let mut changed = S::mask32s::splat(simd, false);
+        let mut next = 0;
+        for chunk in &self.chunks[..self.chunks_len] {
+            let at = usize::from(chunk.at);
+            let mask = S::mask32s::from_bitmask(simd, u64::from(chunk.lanes));
+            let color = S::u32s::from_slice(simd, &self.color[next..next + lanes]).expand(mask);
+            let stored = S::u32s::from_slice(simd, &tile.color[at..at + lanes]);
+            let color = color.simd_ne(NOT_PAINTED).select(color, stored);
+            changed |= color.simd_ne(stored);
+            color.store_slice(&mut tile.color[at..at + lanes]);
+            next += chunk.lanes.count_ones() as usize;
+        }
+        changed
+    }
 }
 
 /// How a patch gets its linear colours.

@@ -1,0 +1,229 @@
+//! Where the pixels of a patch are: tests of who owns a pixel, and where to look for pixels that pass.
+//!
+//! **Who owns a pixel.** A pixel's barycentric coordinates `(b1, b2)` in the root triangle are rounded to a grid of `2^-16`,
+//! half as wide as that of the patches' corners, and moved off the root's border: `b1, b2 >= 1`, `b1 + b2 <= 2^16 - 1`
+//! in grid units. Then an integer edge function decides on which side of each edge of the patch the point lies; the top-left rule, here
+//! in the `(b1, b2)` plane, decides on the edges. It amounts to moving every point by one and the same infinitesimal step, and no point
+//! is on the root's border, so any patches that partition the root own each pixel exactly once, whether or not
+//! they meet edge to edge. (Points on the border could not be shared out by a rule that knows one patch at a time.)
+//!
+//! **Exactness.** An edge function is twice the area of the triangle of the edge and the point, in units of `2^-15` by `2^-16`.
+//! All three lie in the root, the point strictly, so it is smaller in magnitude than the root's `2^31`; and `i32` arithmetic, which
+//! wraps, is exact whenever the result fits, bias of the top-left rule included.
+//!
+//! **Where to look.** The coordinates that a pixel is found to have are off by the triangle's
+//! [`slack`](super::visible::VisibleTriangle::slack) at most. So the pixels of a patch lie in the box of its projection,
+//! widened by that, and where each edge function is at least minus what the slack can change it by. Times the sum of the
+//! root's edge planes, which is positive, an edge function is linear in the pixel: it bounds each row of pixels on the left or on
+//! the right. Where the slack says nothing, all that the triangle may own is searched.
+
+use super::lanes::Lanes3;
+use super::tile::{Bounds, TILE_SIDE, Tile, TileBox};
+use super::visible::VisibleTriangle;
+use crate::geometry::Bary;
+use crate::geometry::screen::Interpolator;
+use crate::math::PixelPoint;
+use crate::simd::Simd;
+use fearless_simd::{SimdBase, SimdFloat, SimdInt};
+
+/// Where 1 lies on the grid of pixels' barycentric coordinates.
+const GRID_UNIT: i32 = 2 * Bary::UNIT as i32;
+
+/// Lanes of the widest vectors.
+pub(super) const MAX_LANES: usize = 16;
+
+/// Pixels by which boxes and rows are widened for rounding.
+const MARGIN: f32 = 1.0 / 64.0;
+
+/// A box that holds all pixels of a patch.
+///
+/// A corner `p = n / w` that moves by up to the slack along `b1` and `b2` moves by at most
+/// `slack (|r1 - r0| + |r2 - r0|) / (w - slack (|w1 - w0| + |w2 - w0|))` along x, with `r = x w - p w` for each corner of
+/// the root; likewise along y.
+#[inline(always)]
+pub(super) fn patch_bounds(
+    owner: &VisibleTriangle,
+    corners: impl FnOnce() -> [PixelPoint; 3],
+    patch: &[Bary; 3],
+) -> Option<Bounds> {
+    if *patch == Bary::ROOT || owner.slack == f32::INFINITY {
+        return Some(owner.bounds);
+    }
+    let [a, b, c] = corners();
+    let slack = f64::from(owner.slack);
+    let w_room = slack * ((b[3] - a[3]).abs() + (c[3] - a[3]).abs());
+    let mut min = [f64::INFINITY; 2];
+    let mut max = [f64::NEG_INFINITY; 2];
+    for corner in patch {
+        let [b0, b1, b2] = corner.weights().map(f64::from);
+        let w = b0 * a[3] + b1 * b[3] + b2 * c[3];
+        let least_w = w - w_room;
+        if least_w <= 0.0 || least_w.is_nan() {
+            return Some(owner.bounds);
+        }
+        let (scale, reach) = (1.0 / w, slack / least_w);
+        for axis in 0..2 {
+            let p = (b0 * a[axis] + b1 * b[axis] + b2 * c[axis]) * scale;
+            let from_b = (b[axis] - a[axis]) - p * (b[3] - a[3]);
+            let from_c = (c[axis] - a[axis]) - p * (c[3] - a[3]);
+            let room = reach * (from_b.abs() + from_c.abs());
+            min[axis] = min[axis].min(p - room);
+            max[axis] = max[axis].max(p + room);
+        }
+    }
+    // The pixels whose centres lie inside. Conversion cuts off behind the point, and saturates.
+    let margin = f64::from(MARGIN);
+    let first = |v: f64| (v + (0.5 - margin)).max(0.0) as u16;
+    let end = |v: f64| (v + (0.5 + margin)).max(0.0) as u16;
+    let ends = [end(max[0]), end(max[1])];
+    if ends[0] == 0 || ends[1] == 0 {
+        return None;
+    }
+    let bounds = Bounds {
+        x0: owner.bounds.x0.max(first(min[0])),
+        y0: owner.bounds.y0.max(first(min[1])),
+        x1: owner.bounds.x1.min(ends[0] - 1),
+        y1: owner.bounds.y1.min(ends[1] - 1),
+    };
+    (bounds.x0 <= bounds.x1 && bounds.y0 <= bounds.y1).then_some(bounds)
+}
+
+/// The edges of a patch as `a b1 + b b2 + c >= 0` on the grid of pixels' barycentric coordinates, the top-left rule
+/// folded into `c`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PatchEdges([[i64; 3]; 3]);
+
+impl PatchEdges {
+    #[inline(always)]
+    pub(super) fn new(corners: [Bary; 3]) -> Self {
+        let edge = |p: Bary, q: Bary| {
+            let [p1, p2, q1, q2] = [p.b1, p.b2, q.b1, q.b2].map(i64::from);
+            let (dx, dy) = (q1 - p1, q2 - p2);
+            let top_left = dy < 0 || (dy == 0 && dx > 0);
+            // Twice: the pixels' grid is half as wide.
+            let c = 2 * (dy * p1 - dx * p2) - i64::from(!top_left);
+            [-dy, dx, c]
+        };
+        let [a, b, c] = corners;
+        Self([edge(a, b), edge(b, c), edge(c, a)])
+    }
+
+    /// Edge functions at these weights, or-ed together: negative where a pixel does not belong to the patch.
+    #[inline(always)]
+    pub(super) fn signs<S: Simd>(&self, simd: S, w: Lanes3<S>) -> S::i32s {
+        let one = S::i32s::splat(simd, 1);
+        let b1 = on_grid::<S>(w[1]).max(one).min(GRID_UNIT - 2);
+        let most = S::i32s::splat(simd, GRID_UNIT - 1) - b1;
+        let b2 = on_grid::<S>(w[2]).max(one).min(most);
+        let mut signs = S::i32s::splat(simd, 0);
+        for [a, b, c] in self.0 {
+            // Only the low 32 bits matter, since the values of the edge function fit.
+            signs |= b1 * a as i32 + b2 * b as i32 + c as i32;
+        }
+        signs
+    }
+
+    /// An edge as a line of a tile's pixels, widened by the slack.
+    #[inline(always)]
+    fn line(
+        &self,
+        edge: usize,
+        planes: &Interpolator,
+        slack: f64,
+        origin: [i32; 2],
+    ) -> Option<Line> {
+        let [a, b, c] = self.0[edge].map(|v| v as f64);
+        let c = c * (1.0 / f64::from(GRID_UNIT)) + (a.abs() + b.abs()) * slack;
+        // `a b1 + b b2 + c (b0 + b1 + b2)`, each `b` a plane.
+        let (a, b) = (a + c, b + c);
+        let combine = |v: [f32; 3]| {
+            let [v0, v1, v2] = v.map(f64::from);
+            c * v0 + a * v1 + b * v2
+        };
+        let (x, y) = (combine(planes.a), combine(planes.b));
+        let at_origin = combine(planes.c)
+            + x * f64::from(origin[0] - planes.anchor[0])
+            + y * f64::from(origin[1] - planes.anchor[1]);
+        let scale = -1.0 / x;
+        let (start, slope) = ((at_origin * scale) as f32, (y * scale) as f32);
+        // Numbers so small keep rounding below half of the margin. What is nearly level, and NaN, bounds no row.
+        (start.abs() < 16384.0 && slope.abs() < 256.0).then_some(Line {
+            is_left: x > 0.0,
+            start,
+            slope,
+        })
+    }
+}
+
+/// A weight rounded to the grid.
+#[inline(always)]
+fn on_grid<S: Simd>(weight: S::f32s) -> S::i32s {
+    (weight * GRID_UNIT as f32 + 0.5).to_int()
+}
+
+/// A bound of rows: a pixel of row `y` is not to the left (or not to the right) of `start + slope y`.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    is_left: bool,
+    start: f32,
+    slope: f32,
+}
+
+/// The columns of each row of a tile in which a patch's pixels lie; none where the last is less than the first.
+#[derive(Clone, Debug)]
+pub(super) struct Rows {
+    /// First column.
+    pub first: [i32; TILE_SIDE + MAX_LANES],
+    /// Last column.
+    pub last: [i32; TILE_SIDE + MAX_LANES],
+}
+
+impl Rows {
+    pub(super) fn new() -> Self {
+        Self {
+            first: [0; TILE_SIDE + MAX_LANES],
+            last: [0; TILE_SIDE + MAX_LANES],
+        }
+    }
+
+    /// Finds the rows of `pixels`; others become meaningless.
+    #[inline(always)]
+    pub(super) fn find<S: Simd>(
+        &mut self,
+        simd: S,
+        tile: &Tile,
+        pixels: TileBox,
+        owner: &VisibleTriangle,
+        edges: Option<&PatchEdges>,
+    ) {
+        let slack = f64::from(owner.slack);
+        let mut lines = [None; 3];
+        if let Some(edges) = edges.filter(|_| owner.slack < f32::INFINITY) {
+            for (index, line) in lines.iter_mut().enumerate() {
+                *line = edges.line(index, &owner.planes, slack, tile.origin);
+            }
+        }
+        let lanes = S::i32s::LEN;
+        let zero = S::f32s::splat(simd, 0.0);
+        let iota = S::i32s::from_fn(simd, |i| i as i32);
+        for y in (pixels.y0..=pixels.y1).step_by(lanes) {
+            let mut first = S::i32s::splat(simd, pixels.x0);
+            let mut last = S::i32s::splat(simd, pixels.x1);
+            let row: S::f32s = (iota + y).to_float();
+            for line in lines.iter().flatten() {
+                let start = S::f32s::splat(simd, line.start);
+                let x = row.mul_add(S::f32s::splat(simd, line.slope), start);
+                // Rounded down, being positive.
+                if line.is_left {
+                    first = first.max((x + (1.0 - MARGIN)).max(zero).to_int::<S::i32s>());
+                } else {
+                    let end = (x + (1.0 + MARGIN)).max(zero).to_int::<S::i32s>();
+                    last = last.min(end - 1);
+                }
+            }
+            let at = y as usize;
+            first.store_slice(&mut self.first[at..at + lanes]);
+            last.store_slice(&mut self.last[at..at + lanes]);
+        }
+    }
+}
