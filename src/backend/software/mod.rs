@@ -199,7 +199,14 @@ impl Backend for SoftwareBackend {
             visible: &self.visible,
             serial: self.serial,
         };
-        repaint::plan(&mut self.jobs, &painter, self.grid, &self.vertices, patches);
+        repaint::plan(
+            exec,
+            &mut self.jobs,
+            &painter,
+            self.grid,
+            &self.vertices,
+            patches,
+        );
         repaint::run(exec, &mut self.tiles, &mut self.jobs, &painter, patches);
         for patch in patches.iter_mut() {
             patch.pixels = 0;

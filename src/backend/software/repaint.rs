@@ -44,8 +44,15 @@ pub(super) struct Job {
     pub pixels: u32,
 }
 
-/// Lists the jobs of all patches, by tile. Patches that face the wrong way or have no area get none.
+/// Whether jobs are shared out between threads.
+fn are_shared(exec: Exec, jobs: &[Job]) -> bool {
+    exec.threads > 1 && jobs.len() > JOBS_PER_TASK
+}
+
+/// Lists the jobs of all patches, by tile if they will be shared out. Patches that face the wrong way or have no area get
+/// none.
 pub(super) fn plan(
+    exec: Exec,
     jobs: &mut Vec<Job>,
     painter: &Painter<'_>,
     grid: Grid,
@@ -72,10 +79,12 @@ pub(super) fn plan(
             pixels: 0,
         }));
     }
-    jobs.sort_unstable_by_key(|job| (job.tile, job.patch));
+    if are_shared(exec, jobs) {
+        jobs.sort_unstable_by_key(|job| u64::from(job.tile) << 32 | u64::from(job.patch));
+    }
 }
 
-/// Does all jobs; each tile's stay together.
+/// Does all jobs; each tile's stay together if they are shared out.
 pub(super) fn run(
     exec: Exec,
     tiles: &mut [Tile],
@@ -96,7 +105,7 @@ fn run_from(
     patches: &[Patch],
 ) {
     let ends = [jobs.first(), jobs.last()].map(|job| job.map(|job| job.tile));
-    if exec.threads < 2 || jobs.len() <= JOBS_PER_TASK || ends[0] == ends[1] {
+    if !are_shared(exec, jobs) || ends[0] == ends[1] {
         dispatch!(exec.level, simd => {
             let work = &mut Workspace::new();
             for job in jobs {
@@ -131,29 +140,45 @@ fn run_from(
 
 /// Memory of one thread, used for one job after the other.
 #[derive(Clone, Debug)]
-struct Workspace {
+struct Workspace<'a> {
+    /// The material illuminated last: the next job shares it as a rule.
+    kit: Option<(u16, ShadingKit<'a>)>,
     rows: Rows,
     batch: Batch,
 }
 
-impl Workspace {
+impl<'a> Workspace<'a> {
     fn new() -> Self {
         Self {
+            kit: None,
             rows: Rows::new(),
             batch: Batch::new(),
+        }
+    }
+
+    /// What illuminating points of a material needs.
+    #[inline(always)]
+    fn kit(&mut self, painter: &Painter<'a>, material: u16) -> ShadingKit<'a> {
+        match self.kit {
+            Some((known, kit)) if known == material => kit,
+            _ => {
+                let kit = painter.kit(material);
+                self.kit = Some((material, kit));
+                kit
+            }
         }
     }
 }
 
 /// Paints a patch's pixels in a tile and counts them.
 #[inline(always)]
-fn paint_job<S: Simd>(
+fn paint_job<'a, S: Simd>(
     simd: S,
     tile: &mut Tile,
     job: &Job,
-    painter: &Painter<'_>,
+    painter: &Painter<'a>,
     patch: &Patch,
-    work: &mut Workspace,
+    work: &mut Workspace<'a>,
 ) -> u32 {
     let world = painter.geometry.world;
     match patch.fill {
@@ -164,7 +189,7 @@ fn paint_job<S: Simd>(
         Fill::Phong { lights, remainder } => {
             let triangle = world.triangles[patch.triangle as usize];
             let fill = PhongFill {
-                kit: painter.kit(world.triangle_material[patch.triangle as usize]),
+                kit: work.kit(painter, world.triangle_material[patch.triangle as usize]),
                 lights,
                 positions: gather(&world.positions, triangle),
                 normals: gather(&world.normals, triangle),
@@ -183,7 +208,7 @@ fn paint_patch<S: Simd>(
     painter: &Painter<'_>,
     patch: &Patch,
     fill: &impl PatchFill,
-    work: &mut Workspace,
+    work: &mut Workspace<'_>,
 ) -> u32 {
     let owner = painter.visible.owner(patch.triangle);
     let edges = (patch.corners != Bary::ROOT).then(|| PatchEdges::new(patch.corners));
