@@ -47,7 +47,7 @@ Examples:
     specula render scenes/teapot.ron -o teapot.png
   Eight frames of at most 2 ms each, at full HD:
     specula render scenes/teapot.ron -o teapot.png --budget 2 --frames 8 --size 1920x1080
-  The same image on every machine, compared with the Phong reference:
+  The same image however fast the machine, compared with the Phong reference:
     specula render scenes/teapot.ron -o teapot.png --work 500000 --error
   Frame times for a script:
     specula render scenes/teapot.ron -o teapot.png --budget 2 --frames 100 --json | jq .frame_ms")]

@@ -306,8 +306,7 @@ impl Renderer {
         };
         loop {
             let pending = stage.backend.pending_pixels(frame);
-            let threads = exec.threads as f64;
-            allowance.reserve_ms(f64::from(cost::present(pending)) * 1e-6 / threads);
+            allowance.reserve_ms(f64::from(cost::present(pending, exec.threads)) * 1e-6);
             if !self.refinement.step(&mut stage, allowance) {
                 break;
             }

@@ -136,6 +136,8 @@ pub(super) struct Refinement {
     /// Expected sum of squared errors over all covered pixels, per channel, in squared codes.
     error_mass: f64,
     counters: Counters,
+    /// Nominal cost of the bounds found by the candidate being planned.
+    units_for_bounds: u64,
     samples: Samples,
     // Workspaces of a piece.
     piece: Vec<Patch>,

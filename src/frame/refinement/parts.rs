@@ -180,6 +180,12 @@ impl Refinement {
         self.queue.push(rank, Candidate::Part(index));
     }
 
+    /// The root that a part belongs to.
+    pub(super) fn root_of_part(&self, index: u32) -> Option<u32> {
+        let leaf = self.parts[index as usize].leaf;
+        self.root_of(self.forest.leaf(leaf).triangle)
+    }
+
     fn shade_part(&mut self, stage: &Stage<'_>, part: &Part, triangle: u32) {
         if let Some(root) = self.root_of(triangle)
             && let Shading::PerPixel(lights, remainder) = self.shading(stage, root)

@@ -2,7 +2,7 @@
 
 use super::parts;
 use super::ranking::{self, Action};
-use super::{Candidate, Owner, PIECE_UNITS, Progress, Refinement, Shading, Stage, root_of};
+use super::{Candidate, Owner, PIECE_UNITS, Progress, Refinement, Root, Shading, Stage, root_of};
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
 use crate::highlight;
@@ -23,12 +23,13 @@ impl Refinement {
                 break;
             };
             let more = self.planning_cost(stage, candidate);
-            if !allowance.admits(units + more) {
+            let bounds = self.bounds_cost(stage, candidate);
+            if !allowance.admits(units + more + bounds) {
                 self.deferred.push(candidate);
                 break;
             }
             if self.plan(stage, candidate) {
-                units += more;
+                units += more + std::mem::take(&mut self.units_for_bounds);
             }
         }
         self.conclude_plans(stage);
@@ -57,6 +58,22 @@ impl Refinement {
             }
         };
         units as u64
+    }
+
+    /// What bounding the lights on the candidate's root will cost, should it come to that.
+    fn bounds_cost(&self, stage: &Stage<'_>, candidate: Candidate) -> u64 {
+        let root = match candidate {
+            Candidate::Root(index) => Some(index),
+            Candidate::Leaf(leaf) => self.root_of(self.forest.leaf(leaf).triangle),
+            Candidate::Part(part) => self.root_of_part(part),
+        };
+        let root = root.map(|index| self.roots[index as usize]);
+        match root {
+            Some(root) if root.shading.is_none() && bounds_pay(&root, stage) => {
+                cost::bounds(stage.world.lights.len()) as u64
+            }
+            _ => 0,
+        }
     }
 
     /// Takes a candidate up. False when it has become void.
@@ -240,11 +257,10 @@ impl Refinement {
             return shading;
         }
         let count = stage.world.lights.len();
-        // Perhaps half of the lights can be left out.
-        let hoped_for = cost::light_saved(root.pixels as f32) * count as f32 * 0.5;
-        let shading = if hoped_for < cost::bounds(count) {
+        let shading = if !bounds_pay(&root, stage) {
             Shading::PerPixel(ActiveLights::all(count), [[0.0; 3]; 3])
         } else {
+            self.units_for_bounds += cost::bounds(count) as u64;
             let bounds = highlight::light_masks(stage.world, &stage.view.eye, root.triangle);
             let evaluated = bounds.active.diffuse.len() + bounds.active.specular.len();
             self.counters.light_terms += (2 * count - evaluated) as u64;
@@ -285,6 +301,12 @@ impl Refinement {
         let rank = self.choose(stage, leaf).0;
         self.queue.push(rank, Candidate::Leaf(leaf));
     }
+}
+
+/// Whether finding out which lights a root needs may save more than it costs: perhaps half of them can be left out.
+fn bounds_pay(root: &Root, stage: &Stage<'_>) -> bool {
+    let lights = stage.world.lights.len();
+    cost::light_saved(root.pixels as f32) * lights as f32 * 0.5 >= cost::bounds(lights)
 }
 
 /// What the colours of a triangle's corners owe to terms that are not evaluated per pixel.
