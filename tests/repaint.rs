@@ -9,6 +9,7 @@ use specula::illumination::ActiveLights;
 use specula::output::Frame;
 use specula::parallel::Exec;
 use specula::scene::{View, World};
+use specula::simd::SimdLevel;
 use support::*;
 
 /// Cuts a root triangle into pieces at random: in two at the middle of an edge or in four, over and over, without care for
@@ -449,5 +450,51 @@ fn two_threads_paint_what_one_does() {
             (pixels, image(&mut backend, exec, &view))
         };
         assert!(draw(best()) == with_two_threads(draw));
+    }
+}
+
+#[test]
+fn levels_with_fused_multiply_add_paint_the_same() {
+    let mut random = Random(18);
+    let fused: Vec<_> = [SimdLevel::Avx2, SimdLevel::Avx512]
+        .into_iter()
+        .filter_map(SimdLevel::token)
+        .map(|level| Exec { level, threads: 1 })
+        .collect();
+    for (mut world, view) in worlds(&mut random) {
+        for i in 0..world.normals.len() {
+            world
+                .normals
+                .set(i, [random.range(-0.7, 0.7), random.range(-0.7, 0.7), -1.0]);
+        }
+        let all = all_triangles(&world);
+        let geometry = geometry(&world, &view, std::slice::from_ref(&all));
+        let lights = ActiveLights::all(world.lights.len());
+        let mut parts = Vec::new();
+        for id in all.clone() {
+            for part in subdivide(&mut random, 25) {
+                let corners = [random.rgb(), random.rgb(), random.rgb()];
+                let mut patch = gouraud(id, part, corners);
+                if random.below(2) == 0 {
+                    patch.fill = Fill::Phong {
+                        lights,
+                        remainder: corners,
+                    };
+                }
+                parts.push(patch);
+            }
+        }
+        let painted: Vec<_> = fused
+            .iter()
+            .map(|&exec| {
+                let mut backend = SoftwareBackend::new();
+                draw_black(&mut backend, exec, geometry);
+                let mut patches = parts.clone();
+                backend.repaint(exec, geometry, &mut patches);
+                let pixels: Vec<_> = patches.iter().map(|patch| patch.pixels).collect();
+                (pixels, image(&mut backend, exec, &view))
+            })
+            .collect();
+        assert!(painted.windows(2).all(|pair| pair[0] == pair[1]));
     }
 }

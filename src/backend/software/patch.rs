@@ -115,12 +115,13 @@ impl PatchEdges {
         let b1 = on_grid::<S>(w[1]).max(one).min(GRID_UNIT - 2);
         let most = S::i32s::splat(simd, GRID_UNIT - 1) - b1;
         let b2 = on_grid::<S>(w[2]).max(one).min(most);
-        let mut signs = S::i32s::splat(simd, 0);
-        for [a, b, c] in self.0 {
-            // Only the low 32 bits matter, since the values of the edge function fit.
-            signs |= b1 * a as i32 + b2 * b as i32 + c as i32;
-        }
-        signs
+        // Only the low 32 bits matter, since the values of the edge functions fit; their sum is the same everywhere.
+        let [[a0, d0, c0], [a1, d1, c1], [_, _, c2]] = self.0.map(|edge| edge.map(|v| v as i32));
+        let first = b1 * a0 + b2 * d0 + c0;
+        let second = b1 * a1 + b2 * d1 + c1;
+        let sum = c0.wrapping_add(c1).wrapping_add(c2);
+        let third = S::i32s::splat(simd, sum) - first - second;
+        first | second | third
     }
 
     /// An edge as a line of a tile's pixels, widened by the slack.

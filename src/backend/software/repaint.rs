@@ -347,10 +347,14 @@ impl Batch {
             if let Some(edges) = edges {
                 mask &= edges.signs(simd, w).simd_ge(0);
             }
-            painted += mask.to_bitmask().count_ones();
-            let color = encode_lanes(simd, fill.colors(simd, w));
-            let color = mask.select(color, S::u32s::splat(simd, NOT_PAINTED));
+            let bits = mask.to_bitmask();
+            let mut color = S::u32s::splat(simd, NOT_PAINTED);
+            // Rare, except where the slack says nothing and a large triangle is searched for a small patch.
+            if bits != 0 {
+                color = mask.select(encode_lanes(simd, fill.colors(simd, w)), color);
+            }
             color.store_slice(&mut self.color[at..at + lanes]);
+            painted += bits.count_ones();
         }
         painted
     }
@@ -388,24 +392,28 @@ struct GouraudFill {
     origin: [f32; 2],
     /// The patch's weights of its second and third corner from the root's, less the origin.
     local_from_root: [[f32; 2]; 2],
+    /// The first corner's colour, and how those of the others differ.
     colors: Corners3,
 }
 
 impl GouraudFill {
     /// Needs a patch with positive area.
+    #[inline(always)]
     fn new(corners: [Bary; 3], colors: Corners3) -> Self {
         let [p, q, r] = corners.map(|c| {
             let [_, b1, b2] = c.weights();
             [b1, b2]
         });
-        // Exact, as is the area before it is rounded once.
+        // Exact; what the area divides is rounded twice.
         let (u, v) = ([q[0] - p[0], q[1] - p[1]], [r[0] - p[0], r[1] - p[1]]);
         let unit = f64::from(Bary::UNIT);
-        let area = (f64::from(Bary::doubled_area(corners)) / (unit * unit)) as f32;
+        let scale = (unit * unit / f64::from(Bary::doubled_area(corners))) as f32;
+        let [a, b, c] = colors;
+        let minus = |v: [f32; 3]| [v[0] - a[0], v[1] - a[1], v[2] - a[2]];
         Self {
             origin: p,
-            local_from_root: [[v[1] / area, -v[0] / area], [-u[1] / area, u[0] / area]],
-            colors,
+            local_from_root: [[v[1] * scale, -v[0] * scale], [-u[1] * scale, u[0] * scale]],
+            colors: [a, minus(b), minus(c)],
         }
     }
 }
@@ -419,7 +427,13 @@ impl PatchFill for GouraudFill {
         let second = u.mul_add(to_second[0], v * to_second[1]).max(0.0).min(one);
         let most = one - second;
         let third = u.mul_add(to_third[0], v * to_third[1]).max(0.0).min(most);
-        interpolate(simd, [most - third, second, third], &self.colors)
+        let [a, b, c] = self.colors;
+        let mut out = [second; 3];
+        for (i, out) in out.iter_mut().enumerate() {
+            let in_second = second.mul_add(S::f32s::splat(simd, b[i]), S::f32s::splat(simd, a[i]));
+            *out = third.mul_add(S::f32s::splat(simd, c[i]), in_second);
+        }
+        out
     }
 }
 
