@@ -15,6 +15,7 @@
 //! No pass's result depends on the number of threads, nor coverage, depth and ids on the SIMD level. All memory is kept from
 //! image to image.
 
+mod fill;
 mod lanes;
 mod patch;
 mod present;

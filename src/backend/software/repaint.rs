@@ -9,7 +9,8 @@
 //!
 //! The work is a list of jobs, a patch in a tile each, sorted by tile and split between tiles.
 
-use super::lanes::{Corners3, Lanes3, gather, interpolate, weights_at};
+use super::fill::{GouraudFill, PatchFill, PhongFill};
+use super::lanes::{gather, weights_at};
 use super::patch::{MAX_LANES, PatchEdges, Rows, patch_bounds};
 use super::resolve::Painter;
 use super::setup::corners;
@@ -18,11 +19,11 @@ use super::transform::Vertices;
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
 use crate::geometry::screen::Interpolator;
-use crate::illumination::{ActiveLights, ShadingKit, shade_lanes};
+use crate::illumination::ShadingKit;
 use crate::output::encode::encode_lanes;
 use crate::parallel::Exec;
 use crate::simd::{Simd, dispatch};
-use fearless_simd::{Bytes, Select, SimdBase, SimdFloat, SimdInt, SimdMask};
+use fearless_simd::{Bytes, Select, SimdBase, SimdInt, SimdMask};
 
 /// Jobs are not split into fewer than these.
 const JOBS_PER_TASK: usize = 4;
@@ -376,87 +377,5 @@ impl Batch {
             next += chunk.lanes.count_ones() as usize;
         }
         changed
-    }
-}
-
-/// How a patch gets its linear colours.
-trait PatchFill {
-    /// The colours at the weights of the root triangle's corners.
-    fn colors<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S>;
-}
-
-/// Corner colours, interpolated in the patch: never beyond what lies between them, however small the patch and however
-/// roundly a pixel belongs to it.
-struct GouraudFill {
-    /// Second and third weight of the patch's first corner.
-    origin: [f32; 2],
-    /// The patch's weights of its second and third corner from the root's, less the origin.
-    local_from_root: [[f32; 2]; 2],
-    /// The first corner's colour, and how those of the others differ.
-    colors: Corners3,
-}
-
-impl GouraudFill {
-    /// Needs a patch with positive area.
-    #[inline(always)]
-    fn new(corners: [Bary; 3], colors: Corners3) -> Self {
-        let [p, q, r] = corners.map(|c| {
-            let [_, b1, b2] = c.weights();
-            [b1, b2]
-        });
-        // Exact; what the area divides is rounded twice.
-        let (u, v) = ([q[0] - p[0], q[1] - p[1]], [r[0] - p[0], r[1] - p[1]]);
-        let unit = f64::from(Bary::UNIT);
-        let scale = (unit * unit / f64::from(Bary::doubled_area(corners))) as f32;
-        let [a, b, c] = colors;
-        let minus = |v: [f32; 3]| [v[0] - a[0], v[1] - a[1], v[2] - a[2]];
-        Self {
-            origin: p,
-            local_from_root: [[v[1] * scale, -v[0] * scale], [-u[1] * scale, u[0] * scale]],
-            colors: [a, minus(b), minus(c)],
-        }
-    }
-}
-
-impl PatchFill for GouraudFill {
-    #[inline(always)]
-    fn colors<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S> {
-        let (u, v) = (w[1] - self.origin[0], w[2] - self.origin[1]);
-        let [to_second, to_third] = self.local_from_root;
-        let one = S::f32s::splat(simd, 1.0);
-        let second = u.mul_add(to_second[0], v * to_second[1]).max(0.0).min(one);
-        let most = one - second;
-        let third = u.mul_add(to_third[0], v * to_third[1]).max(0.0).min(most);
-        let [a, b, c] = self.colors;
-        let mut out = [second; 3];
-        for (i, out) in out.iter_mut().enumerate() {
-            let in_second = second.mul_add(S::f32s::splat(simd, b[i]), S::f32s::splat(simd, a[i]));
-            *out = third.mul_add(S::f32s::splat(simd, c[i]), in_second);
-        }
-        out
-    }
-}
-
-/// The illumination equation under some lights, and an interpolated rest.
-struct PhongFill<'a> {
-    kit: ShadingKit<'a>,
-    lights: ActiveLights,
-    positions: Corners3,
-    normals: Corners3,
-    remainder: Corners3,
-}
-
-impl PatchFill for PhongFill<'_> {
-    #[inline(always)]
-    fn colors<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S> {
-        let point = interpolate(simd, w, &self.positions);
-        let normal = interpolate(simd, w, &self.normals);
-        let shaded = shade_lanes(simd, &self.kit, &self.lights, point, normal);
-        let rest = interpolate(simd, w, &self.remainder);
-        [
-            shaded[0] + rest[0],
-            shaded[1] + rest[1],
-            shaded[2] + rest[2],
-        ]
     }
 }
