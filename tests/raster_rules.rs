@@ -395,9 +395,9 @@ fn the_widest_image_is_exact_to_its_far_corner() {
 }
 
 /// A few large triangles in perspective with colours and normals at their vertices.
-fn colorful(random: &mut Random) -> (World, Vec3s) {
+fn colourful(random: &mut Random) -> (World, Vec3s) {
     let mut world = empty_world();
-    let mut colors = Vec3s::default();
+    let mut colours = Vec3s::default();
     for _ in 0..25 {
         let mut corner = || {
             [
@@ -410,21 +410,21 @@ fn colorful(random: &mut Random) -> (World, Vec3s) {
         let mut normal = || [random.range(-0.5, 0.5), random.range(-0.5, 0.5), -1.0];
         let normals = [normal(), normal(), normal()];
         add_triangle(&mut world, corners, normals, 1);
-        (0..3).for_each(|_| colors.push(random.rgb()));
+        (0..3).for_each(|_| colours.push(random.rgb()));
     }
-    (world, colors)
+    (world, colours)
 }
 
 #[test]
 fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
     let mut random = Random(8);
-    let (world, colors) = colorful(&mut random);
+    let (world, colours) = colourful(&mut random);
     let view = perspective(150, 100, 90.0, 0.1, 50.0);
-    let mut flat_colors = Vec3s::default();
+    let mut flat_colours = Vec3s::default();
     world
         .triangles
         .iter()
-        .for_each(|_| flat_colors.push(random.rgb()));
+        .for_each(|_| flat_colours.push(random.rgb()));
     let all = 0..world.triangles.len() as u32;
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
     let mut backend = SoftwareBackend::new();
@@ -432,8 +432,8 @@ fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
         backend.rasterize(exec, geometry);
         let ids = Visibility::of(&backend).ids;
         for (paint, name) in [
-            (BasePaint::Gouraud(&colors), "gouraud"),
-            (BasePaint::Flat(&flat_colors), "flat"),
+            (BasePaint::Gouraud(&colours), "gouraud"),
+            (BasePaint::Flat(&flat_colours), "flat"),
             (BasePaint::Phong, "phong"),
         ] {
             backend.resolve(exec, geometry, paint);
@@ -452,8 +452,8 @@ fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
                         std::array::from_fn(|k| (0..3).map(|c| w[c] * corners[c][k]).sum())
                     };
                     match paint {
-                        BasePaint::Gouraud(colors) => mix(colors).map(f64::from),
-                        BasePaint::Flat(colors) => colors.get(id as usize).map(f64::from),
+                        BasePaint::Gouraud(colours) => mix(colours).map(f64::from),
+                        BasePaint::Flat(colours) => colours.get(id as usize).map(f64::from),
                         BasePaint::Phong => {
                             let to_f64 = |v: [f32; 3]| glam::DVec3::from_array(v.map(f64::from));
                             {
@@ -493,13 +493,13 @@ fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
 }
 
 #[test]
-fn colors_do_not_depend_on_threads() {
+fn colours_do_not_depend_on_threads() {
     let mut random = Random(9);
-    let (world, colors) = colorful(&mut random);
+    let (world, colours) = colourful(&mut random);
     let view = perspective(333, 222, 200.0, 0.1, 50.0);
     let all = 0..world.triangles.len() as u32;
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
-    for paint in [BasePaint::Gouraud(&colors), BasePaint::Phong] {
+    for paint in [BasePaint::Gouraud(&colours), BasePaint::Phong] {
         let draw = |exec| {
             let mut backend = SoftwareBackend::new();
             let mut frame = Frame::new(333, 222);
@@ -527,10 +527,10 @@ fn frames_receive_exactly_the_tiles_that_changed() {
     let all = 0..1;
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
     let paint = |backend: &mut SoftwareBackend, value: f32| {
-        let mut colors = Vec3s::default();
-        (0..3).for_each(|_| colors.push([value; 3]));
+        let mut colours = Vec3s::default();
+        (0..3).for_each(|_| colours.push([value; 3]));
         backend.rasterize(exec, geometry);
-        backend.resolve(exec, geometry, BasePaint::Gouraud(&colors));
+        backend.resolve(exec, geometry, BasePaint::Gouraud(&colours));
     };
     let mut backend = SoftwareBackend::new();
     let (mut a, mut b) = (Frame::new(256, 128), Frame::new(256, 128));

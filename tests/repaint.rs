@@ -43,17 +43,17 @@ fn subdivide(random: &mut Random, pieces: usize) -> Vec<[Bary; 3]> {
     all
 }
 
-fn gouraud(triangle: u32, corners: [Bary; 3], colors: [[f32; 3]; 3]) -> Patch {
+fn gouraud(triangle: u32, corners: [Bary; 3], colours: [[f32; 3]; 3]) -> Patch {
     Patch {
         triangle,
         corners,
-        fill: Fill::Gouraud(colors),
+        fill: Fill::Gouraud(colours),
         pixels: 0,
     }
 }
 
 /// A root triangle's colours at the corners of a patch.
-fn colors_at(patch: [Bary; 3], root: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
+fn colours_at(patch: [Bary; 3], root: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
     patch.map(|corner| {
         let w = corner.weights();
         std::array::from_fn(|k| w[0] * root[0][k] + w[1] * root[1][k] + w[2] * root[2][k])
@@ -226,27 +226,27 @@ fn no_pixel_is_lost_where_patches_are_as_fine_as_the_grid() {
 }
 
 #[test]
-fn linear_colors_on_any_partition_give_the_gouraud_image() {
+fn linear_colours_on_any_partition_give_the_gouraud_image() {
     let mut random = Random(12);
     for (world, view) in worlds(&mut random) {
-        let mut colors = Vec3s::default();
-        (0..world.positions.len()).for_each(|_| colors.push(random.rgb()));
+        let mut colours = Vec3s::default();
+        (0..world.positions.len()).for_each(|_| colours.push(random.rgb()));
         let all = all_triangles(&world);
         let geometry = geometry(&world, &view, std::slice::from_ref(&all));
         for exec in levels() {
             let mut backend = SoftwareBackend::new();
             backend.rasterize(exec, geometry);
-            backend.resolve(exec, geometry, BasePaint::Gouraud(&colors));
+            backend.resolve(exec, geometry, BasePaint::Gouraud(&colours));
             let want = image(&mut backend, exec, &view);
             draw_black(&mut backend, exec, geometry);
             let mut patches = Vec::new();
             for &id in backend.visible_triangles() {
-                let root = world.triangles[id as usize].map(|v| colors.get(v as usize));
+                let root = world.triangles[id as usize].map(|v| colours.get(v as usize));
                 let parts = subdivide(&mut random, 30);
                 patches.extend(
                     parts
                         .into_iter()
-                        .map(|part| gouraud(id, part, colors_at(part, root))),
+                        .map(|part| gouraud(id, part, colours_at(part, root))),
                 );
             }
             backend.repaint(exec, geometry, &mut patches);
@@ -263,7 +263,7 @@ fn linear_colors_on_any_partition_give_the_gouraud_image() {
 }
 
 #[test]
-fn colors_never_leave_the_range_of_a_patch_however_small() {
+fn colours_never_leave_the_range_of_a_patch_however_small() {
     let mut random = Random(13);
     let mut world = empty_world();
     let corners = [[0.0, 0.0, 0.5], [150.0, 3.0, 0.5], [5.0, 90.0, 0.5]];
@@ -349,15 +349,15 @@ fn without_lights_ambient_and_the_remainder_are_left() {
     let (view, all) = (flat(90, 70), 0..1);
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
     let remainder = [[0.1, 0.5, 0.9], [0.8, 0.2, 0.3], [0.0, 0.4, 0.7]];
-    let mut colors = Vec3s::default();
+    let mut colours = Vec3s::default();
     for corner in remainder {
-        colors.push(std::array::from_fn(|k| {
+        colours.push(std::array::from_fn(|k| {
             corner[k] + world.materials[0].ambient[k]
         }));
     }
     let mut backend = SoftwareBackend::new();
     backend.rasterize(best(), geometry);
-    backend.resolve(best(), geometry, BasePaint::Gouraud(&colors));
+    backend.resolve(best(), geometry, BasePaint::Gouraud(&colours));
     let want = image(&mut backend, best(), &view);
     draw_black(&mut backend, best(), geometry);
     let fill = Fill::Phong {

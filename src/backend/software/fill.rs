@@ -9,7 +9,7 @@ use fearless_simd::{SimdBase, SimdFloat};
 /// How a patch gets its linear colours.
 pub(super) trait PatchFill {
     /// The colours at the weights of the root triangle's corners.
-    fn colors<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S>;
+    fn colours<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S>;
 }
 
 /// Corner colours, interpolated in the patch: never beyond what lies between them, however small the patch and however
@@ -20,13 +20,13 @@ pub(super) struct GouraudFill {
     /// The patch's weights of its second and third corner from the root's, less the origin.
     local_from_root: [[f32; 2]; 2],
     /// The first corner's colour, and how those of the others differ.
-    colors: Corners3,
+    colours: Corners3,
 }
 
 impl GouraudFill {
     /// Needs a patch with positive area.
     #[inline(always)]
-    pub(super) fn new(corners: [Bary; 3], colors: Corners3) -> Self {
+    pub(super) fn new(corners: [Bary; 3], colours: Corners3) -> Self {
         let [p, q, r] = corners.map(|c| {
             let [_, b1, b2] = c.weights();
             [b1, b2]
@@ -35,26 +35,26 @@ impl GouraudFill {
         let (u, v) = ([q[0] - p[0], q[1] - p[1]], [r[0] - p[0], r[1] - p[1]]);
         let unit = f64::from(Bary::UNIT);
         let scale = (unit * unit / f64::from(Bary::doubled_area(corners))) as f32;
-        let [a, b, c] = colors;
+        let [a, b, c] = colours;
         let minus = |v: [f32; 3]| [v[0] - a[0], v[1] - a[1], v[2] - a[2]];
         Self {
             origin: p,
             local_from_root: [[v[1] * scale, -v[0] * scale], [-u[1] * scale, u[0] * scale]],
-            colors: [a, minus(b), minus(c)],
+            colours: [a, minus(b), minus(c)],
         }
     }
 }
 
 impl PatchFill for GouraudFill {
     #[inline(always)]
-    fn colors<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S> {
+    fn colours<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S> {
         let (u, v) = (w[1] - self.origin[0], w[2] - self.origin[1]);
         let [to_second, to_third] = self.local_from_root;
         let one = S::f32s::splat(simd, 1.0);
         let second = u.mul_add(to_second[0], v * to_second[1]).max(0.0).min(one);
         let most = one - second;
         let third = u.mul_add(to_third[0], v * to_third[1]).max(0.0).min(most);
-        let [a, b, c] = self.colors;
+        let [a, b, c] = self.colours;
         let mut out = [second; 3];
         for (i, out) in out.iter_mut().enumerate() {
             let in_second = second.mul_add(S::f32s::splat(simd, b[i]), S::f32s::splat(simd, a[i]));
@@ -80,7 +80,7 @@ pub(super) struct PhongFill<'a> {
 
 impl PatchFill for PhongFill<'_> {
     #[inline(always)]
-    fn colors<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S> {
+    fn colours<S: Simd>(&self, simd: S, w: Lanes3<S>) -> Lanes3<S> {
         let point = interpolate(simd, w, &self.positions);
         let normal = interpolate(simd, w, &self.normals);
         let shaded = shade_lanes(simd, &self.kit, &self.lights, point, normal);

@@ -50,12 +50,12 @@ pub(super) fn stale_tiles(tiles: &[Tile], known: Option<u64>) -> impl Iterator<I
 /// Copies a tile into the rows of the frame that it takes part in.
 fn copy_tile(tile: &Tile, frame_width: usize, band: &mut [[u8; 4]]) {
     let (left, width) = (tile.origin[0] as usize, tile.width as usize);
-    for (row, colors) in band
+    for (row, colours) in band
         .chunks_mut(frame_width)
-        .zip(tile.color.chunks(TILE_SIDE))
+        .zip(tile.colour.chunks(TILE_SIDE))
     {
-        for (pixel, color) in row[left..left + width].iter_mut().zip(colors) {
-            *pixel = color.to_le_bytes();
+        for (pixel, colour) in row[left..left + width].iter_mut().zip(colours) {
+            *pixel = colour.to_le_bytes();
         }
     }
 }

@@ -183,8 +183,8 @@ fn paint_job<'a, S: Simd>(
 ) -> u32 {
     let world = painter.geometry.world;
     match patch.fill {
-        Fill::Gouraud(colors) => {
-            let fill = GouraudFill::new(patch.corners, colors);
+        Fill::Gouraud(colours) => {
+            let fill = GouraudFill::new(patch.corners, colours);
             paint_patch(simd, tile, job, painter, patch, &fill, work)
         }
         Fill::Phong { lights, remainder } => {
@@ -225,7 +225,7 @@ fn paint_patch<S: Simd>(
     while place.y <= place.last_y {
         let batch = &mut work.batch;
         batch.collect(simd, tile, patch.triangle, &work.rows, &mut place);
-        painted += batch.color(simd, tile.origin, &owner.planes, edges.as_ref(), fill);
+        painted += batch.colour(simd, tile.origin, &owner.planes, edges.as_ref(), fill);
         changed |= batch.put_back(simd, tile);
     }
     if changed.any_true() {
@@ -264,7 +264,7 @@ struct Batch {
     index: [u32; BATCH + MAX_LANES],
     len: usize,
     /// Their encoded colours, or [`NOT_PAINTED`].
-    color: [u32; BATCH + MAX_LANES],
+    colour: [u32; BATCH + MAX_LANES],
 }
 
 impl Batch {
@@ -274,7 +274,7 @@ impl Batch {
             chunks_len: 0,
             index: [0; BATCH + MAX_LANES],
             len: 0,
-            color: [NOT_PAINTED; BATCH + MAX_LANES],
+            colour: [NOT_PAINTED; BATCH + MAX_LANES],
         }
     }
 
@@ -326,7 +326,7 @@ impl Batch {
 
     /// Colours the pixels that belong to the patch, and counts them.
     #[inline(always)]
-    fn color<S: Simd>(
+    fn colour<S: Simd>(
         &mut self,
         simd: S,
         origin: [i32; 2],
@@ -349,12 +349,12 @@ impl Batch {
                 mask &= edges.signs(simd, w).simd_ge(0);
             }
             let bits = mask.to_bitmask();
-            let mut color = S::u32s::splat(simd, NOT_PAINTED);
+            let mut colour = S::u32s::splat(simd, NOT_PAINTED);
             // Rare, except where the slack says nothing and a large triangle is searched for a small patch.
             if bits != 0 {
-                color = mask.select(encode_lanes(simd, fill.colors(simd, w)), color);
+                colour = mask.select(encode_lanes(simd, fill.colours(simd, w)), colour);
             }
-            color.store_slice(&mut self.color[at..at + lanes]);
+            colour.store_slice(&mut self.colour[at..at + lanes]);
             painted += bits.count_ones();
         }
         painted
@@ -369,11 +369,11 @@ impl Batch {
         for chunk in &self.chunks[..self.chunks_len] {
             let at = usize::from(chunk.at);
             let mask = S::mask32s::from_bitmask(simd, u64::from(chunk.lanes));
-            let color = S::u32s::from_slice(simd, &self.color[next..next + lanes]).expand(mask);
-            let stored = S::u32s::from_slice(simd, &tile.color[at..at + lanes]);
-            let color = color.simd_ne(NOT_PAINTED).select(color, stored);
-            changed |= color.simd_ne(stored);
-            color.store_slice(&mut tile.color[at..at + lanes]);
+            let colour = S::u32s::from_slice(simd, &self.colour[next..next + lanes]).expand(mask);
+            let stored = S::u32s::from_slice(simd, &tile.colour[at..at + lanes]);
+            let colour = colour.simd_ne(NOT_PAINTED).select(colour, stored);
+            changed |= colour.simd_ne(stored);
+            colour.store_slice(&mut tile.colour[at..at + lanes]);
             next += chunk.lanes.count_ones() as usize;
         }
         changed

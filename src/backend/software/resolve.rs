@@ -63,16 +63,16 @@ pub(super) fn resolve_tile<S: Simd>(
         return;
     }
     match paint {
-        BasePaint::Gouraud(colors) => {
+        BasePaint::Gouraud(colours) => {
             let mut gouraud = Gouraud {
                 painter,
-                colors,
+                colours,
                 last: NO_TRIANGLE,
                 corners: Corners3::default(),
             };
             paint_tile(simd, tile, painter, &mut gouraud);
         }
-        BasePaint::Flat(colors) => paint_tile(simd, tile, painter, &mut Flat { colors }),
+        BasePaint::Flat(colours) => paint_tile(simd, tile, painter, &mut Flat { colours }),
         BasePaint::Phong => {
             let active = ActiveLights::all(painter.world().lights.len());
             let mut phong = Phong {
@@ -86,10 +86,10 @@ pub(super) fn resolve_tile<S: Simd>(
 }
 
 /// Fills a tile without triangles.
-fn fill(tile: &mut Tile, color: u32, serial: u64) {
-    if tile.filled != Some(color) {
-        tile.color.fill(color);
-        tile.filled = Some(color);
+fn fill(tile: &mut Tile, colour: u32, serial: u64) {
+    if tile.filled != Some(colour) {
+        tile.colour.fill(colour);
+        tile.filled = Some(colour);
         tile.serial = serial;
     }
 }
@@ -116,7 +116,7 @@ impl<S: Simd> Owners<'_, S> {
 /// How the pixels of one vector get their linear colours.
 trait Surface {
     /// Puts the colours of the pixels in the bit set `covered` over `background`.
-    fn colors<S: Simd>(
+    fn colours<S: Simd>(
         &mut self,
         simd: S,
         owners: Owners<'_, S>,
@@ -142,7 +142,7 @@ fn paint_tile<S: Simd>(
             let slice = &tile.id[at..at + lanes];
             let ids = S::u32s::from_slice(simd, slice);
             let covered = ids.simd_ne(NO_TRIANGLE).to_bitmask();
-            let color = if covered == 0 {
+            let colour = if covered == 0 {
                 encoded_background
             } else {
                 let owners = Owners {
@@ -150,12 +150,12 @@ fn paint_tile<S: Simd>(
                     slice,
                     pixel: [tile.origin[0] + x, tile.origin[1] + y],
                 };
-                let linear = surface.colors(simd, owners, covered, background);
+                let linear = surface.colours(simd, owners, covered, background);
                 encode_lanes(simd, linear)
             };
-            let stored = &mut tile.color[at..at + lanes];
-            changed |= color.simd_ne(S::u32s::from_slice(simd, stored));
-            color.store_slice(stored);
+            let stored = &mut tile.colour[at..at + lanes];
+            changed |= colour.simd_ne(S::u32s::from_slice(simd, stored));
+            colour.store_slice(stored);
         }
     }
     tile.filled = None;
@@ -167,7 +167,7 @@ fn paint_tile<S: Simd>(
 /// Vertex colours, interpolated.
 struct Gouraud<'a> {
     painter: &'a Painter<'a>,
-    colors: &'a Vec3s,
+    colours: &'a Vec3s,
     /// The triangle painted last: as a rule the next vector begins with it.
     last: u32,
     /// Its corners' colours.
@@ -176,7 +176,7 @@ struct Gouraud<'a> {
 
 impl Surface for Gouraud<'_> {
     #[inline(always)]
-    fn colors<S: Simd>(
+    fn colours<S: Simd>(
         &mut self,
         simd: S,
         owners: Owners<'_, S>,
@@ -189,11 +189,11 @@ impl Surface for Gouraud<'_> {
             let w = self.painter.weights(simd, id, owners.pixel);
             if id != self.last {
                 let triangle = self.painter.world().triangles[id as usize];
-                self.corners = gather(self.colors, triangle);
+                self.corners = gather(self.colours, triangle);
                 self.last = id;
             }
-            let color = interpolate(simd, w, &self.corners);
-            out = select3::<S>(mask, color, out);
+            let colour = interpolate(simd, w, &self.corners);
+            out = select3::<S>(mask, colour, out);
             left &= !mask.to_bitmask();
         }
         out
@@ -202,12 +202,12 @@ impl Surface for Gouraud<'_> {
 
 /// One colour for each triangle.
 struct Flat<'a> {
-    colors: &'a Vec3s,
+    colours: &'a Vec3s,
 }
 
 impl Surface for Flat<'_> {
     #[inline(always)]
-    fn colors<S: Simd>(
+    fn colours<S: Simd>(
         &mut self,
         simd: S,
         owners: Owners<'_, S>,
@@ -217,8 +217,8 @@ impl Surface for Flat<'_> {
         let (mut left, mut out) = (covered, background);
         while left != 0 {
             let (id, mask) = owners.first(left);
-            let color = splat3(simd, self.colors.get(id as usize));
-            out = select3::<S>(mask, color, out);
+            let colour = splat3(simd, self.colours.get(id as usize));
+            out = select3::<S>(mask, colour, out);
             left &= !mask.to_bitmask();
         }
         out
@@ -249,7 +249,7 @@ impl<'a> Phong<'a> {
 
 impl Surface for Phong<'_> {
     #[inline(always)]
-    fn colors<S: Simd>(
+    fn colours<S: Simd>(
         &mut self,
         simd: S,
         owners: Owners<'_, S>,
@@ -278,8 +278,8 @@ impl Surface for Phong<'_> {
                 unseen &= !mask.to_bitmask();
             }
             let kit = self.kit(material);
-            let color = shade_lanes(simd, &kit, &self.active, point, normal);
-            out = select3::<S>(alike, color, out);
+            let colour = shade_lanes(simd, &kit, &self.active, point, normal);
+            out = select3::<S>(alike, colour, out);
             left &= !alike.to_bitmask();
         }
         out

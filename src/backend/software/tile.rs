@@ -40,7 +40,7 @@ pub(super) struct Tile {
     /// Reversed depth of each pixel, or [`NO_DEPTH`].
     pub depth: [f32; TILE_PIXELS],
     /// Encoded colour of each pixel, RGBA from the lowest byte up.
-    pub color: [u32; TILE_PIXELS],
+    pub colour: [u32; TILE_PIXELS],
     /// The image pixel in its top left corner.
     pub origin: [i32; 2],
     /// Columns inside the image.
@@ -49,9 +49,9 @@ pub(super) struct Tile {
     pub height: i32,
     /// Pixels that have a triangle.
     pub covered: u32,
-    /// The colour, if all of `color` is one colour because nothing was painted since it was filled.
+    /// The colour, if all of `colour` is one colour because nothing was painted since it was filled.
     pub filled: Option<u32>,
-    /// The backend's serial number when `color` changed last.
+    /// The backend's serial number when `colour` changed last.
     pub serial: u64,
     /// Owners of the pixels in order, background left out.
     pub runs: Vec<Run>,
@@ -65,7 +65,7 @@ impl Tile {
         Self {
             id: [NO_TRIANGLE; TILE_PIXELS],
             depth: [NO_DEPTH; TILE_PIXELS],
-            color: [0; TILE_PIXELS],
+            colour: [0; TILE_PIXELS],
             origin,
             width: side.min(grid.width as i32 - origin[0]),
             height: side.min(grid.height as i32 - origin[1]),
