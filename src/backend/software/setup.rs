@@ -23,7 +23,7 @@ pub(super) struct Prepared {
     pub id: u32,
     /// The pixels that may be covered.
     pub bounds: Bounds,
-    /// Snapped corners, clockwise on the screen.
+    /// Snapped corners, turned so that their area is positive.
     pub corners: [[i32; 2]; 3],
     /// Depth of the whole triangle.
     pub depth: DepthPlane,
