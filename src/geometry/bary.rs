@@ -55,6 +55,18 @@ impl Bary {
         })
     }
 
+    /// The quarters of a triangle, or `None` where the grid is too coarse for them.
+    #[must_use]
+    pub fn quarters(corners: [Self; 3]) -> Option<[[Self; 3]; 4]> {
+        let [a, b, c] = corners;
+        let middles = [
+            Self::midpoint(a, b)?,
+            Self::midpoint(b, c)?,
+            Self::midpoint(c, a)?,
+        ];
+        Some(quarters(corners, middles))
+    }
+
     /// Twice the signed area of triangle `a b c` in grid units; the root's is `UNIT * UNIT`.
     #[must_use]
     pub fn doubled_area([a, b, c]: [Self; 3]) -> i32 {
@@ -69,9 +81,41 @@ impl Bary {
     }
 }
 
+/// The quarters of a triangle, turning like it, by its corners and the middles of its edges; middle k is between
+/// corners k and k + 1.
+#[must_use]
+pub fn quarters<T: Copy>([a, b, c]: [T; 3], middles: [T; 3]) -> [[T; 3]; 4] {
+    let [ab, bc, ca] = middles;
+    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+}
+
+/// What linear interpolation between three corners gives in the middles of the edges.
+#[must_use]
+pub fn middles(v: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|k| (v[i][k] + v[(i + 1) % 3][k]) * 0.5))
+}
+
+/// The weighted sum of three vectors.
+#[must_use]
+pub fn blend(weights: [f32; 3], v: [[f32; 3]; 3]) -> [f32; 3] {
+    std::array::from_fn(|k| weights[0] * v[0][k] + weights[1] * v[1][k] + weights[2] * v[2][k])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn quarters_partition_the_root_and_keep_its_sense() {
+        let quarters = Bary::quarters(Bary::ROOT).expect("far above the grid");
+        assert_eq!(quarters.map(Bary::doubled_area), [1 << 28; 4]);
+        let weights = Bary::ROOT.map(Bary::weights);
+        let by_weights = super::quarters(weights, middles(weights));
+        assert_eq!(
+            quarters.map(|quarter| quarter.map(Bary::weights)),
+            by_weights
+        );
+    }
 
     #[test]
     fn midpoints_are_exact_until_the_grid_ends() {

@@ -3,6 +3,7 @@
 use super::estimate::{self, Samples};
 use super::split::Planner;
 use super::vertices::VertexPool;
+use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
 use crate::parallel::Exec;
 use crate::scene::{Eye, World};
@@ -53,7 +54,7 @@ pub struct Leaf {
     pub(super) midpoints: [u32; 3],
     /// The next half-edge (`4 * leaf + k`) on the same welded edge.
     next_on_edge: [u32; 3],
-    /// It takes part in a split that is being planned.
+    /// It takes part in a split that is being planned, or has been planted and not been illuminated.
     pub(super) busy: bool,
 }
 
@@ -107,7 +108,8 @@ impl Forest {
         &self.leaves[id as usize]
     }
 
-    /// Whether the leaf takes part in a split that has been planned and not concluded: it must be left alone until then.
+    /// Whether the leaf takes part in a split that has been planned and not concluded, or has been planted and not been
+    /// illuminated: it must be left alone until then.
     #[must_use]
     pub fn is_in_plan(&self, id: LeafId) -> bool {
         self.leaves[id as usize].busy
@@ -119,10 +121,9 @@ impl Forest {
         self.open
     }
 
-    /// Whether `more` leaves still fit.
-    #[must_use]
-    pub fn has_room(&self, more: usize) -> bool {
-        self.leaves.len() + more <= MAX_LEAVES
+    /// Whether `more` leaves still fit beside those that are planned.
+    pub(super) fn has_room(&self, more: usize) -> bool {
+        self.leaves.len() + self.planner.planned_leaves() + more <= MAX_LEAVES
     }
 
     /// Makes the triangle itself a leaf of `pixels` visible pixels, unless it has been planted before. Its error is known
@@ -148,7 +149,10 @@ impl Forest {
         self.prepare(world, base_colours, &mut root);
         let samples = root.samples.clone();
         let id = self.insert(world, &root, LeafError::NONE);
-        self.leaves[id as usize].pixels = pixels;
+        let leaf = &mut self.leaves[id as usize];
+        leaf.pixels = pixels;
+        // No split may use its midpoints before they are illuminated.
+        leaf.busy = true;
         self.planted.insert(triangle, id);
         self.fresh.push((id, samples));
         Some(id)
@@ -172,20 +176,17 @@ impl Forest {
     ) {
         self.vertices.illuminate(exec, world, eye, base_colours);
         self.samples.illuminate(exec, world, eye);
-        for (id, samples) in std::mem::take(&mut self.fresh).drain(..) {
+        let mut fresh = std::mem::take(&mut self.fresh);
+        for (id, samples) in fresh.drain(..) {
             let error = self.own_error(self.leaves[id as usize].midpoints, samples);
             let leaf = &mut self.leaves[id as usize];
             (leaf.error, leaf.spread) = (error.mean_square, error.spread);
+            leaf.busy = false;
             planted.push(id);
         }
+        self.fresh = fresh;
         self.estimate_planned(exec, base_colours);
         self.samples.clear();
-    }
-
-    /// Points whose illumination is still to come: what [`illuminate`](Self::illuminate) will cost.
-    #[must_use]
-    pub fn unlit_points(&self) -> usize {
-        self.vertices.unlit() + self.samples.len()
     }
 
     /// Notes how many pixels painting has found the leaf to have.
@@ -390,11 +391,6 @@ impl Forest {
         let b = self.vertices.weld(world, vertices[(k + 1) % 3]);
         [a.min(b), a.max(b)]
     }
-}
-
-/// The weighted sum of three vectors.
-pub(super) fn blend(weights: [f32; 3], v: [[f32; 3]; 3]) -> [f32; 3] {
-    std::array::from_fn(|k| weights[0] * v[0][k] + weights[1] * v[1][k] + weights[2] * v[2][k])
 }
 
 /// An estimated error, and how it is spread over a leaf.

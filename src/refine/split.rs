@@ -1,7 +1,8 @@
 //! Splitting leaves along marked edges: planned, illuminated, then committed if it helps.
 
 use super::estimate::{deviations, mean_square};
-use super::forest::{Forest, LeafError, LeafId, LeafState, NONE, Seedling, blend};
+use super::forest::{Forest, LeafError, LeafId, LeafState, NONE, Seedling};
+use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
 use crate::parallel::Exec;
 use crate::scene::World;
@@ -89,6 +90,11 @@ impl Planner {
         self.parents.clear();
         self.children.clear();
     }
+
+    /// Leaves that will be added if every planned split is committed.
+    pub(super) fn planned_leaves(&self) -> usize {
+        self.children.len()
+    }
 }
 
 impl Forest {
@@ -110,8 +116,7 @@ impl Forest {
         }
         let first_parent = self.planner.parents.len();
         let verdict = self.gather_parents(world, leaf, marks, first_parent);
-        let leaves_needed =
-            4 * (self.planner.parents.len() - first_parent + self.planner.children.len());
+        let leaves_needed = 4 * (self.planner.parents.len() - first_parent);
         let verdict = match verdict {
             PlanOutcome::Planned if !self.has_room(leaves_needed) => PlanOutcome::Never,
             other => other,

@@ -1,7 +1,8 @@
 //! Random walks through refinement: whatever is split, the leaves stay a conforming partition.
 
 use super::forest::NONE;
-use super::{Forest, LeafId, LeafState, SplitOutcome};
+use super::{Forest, LeafId, LeafState, PlanOutcome, SplitOutcome};
+use crate::geometry::bary::blend;
 use crate::geometry::topology::Topology;
 use crate::geometry::{Bary, Mesh, Vec3s, shapes};
 use crate::parallel::Exec;
@@ -188,9 +189,8 @@ fn refined_vertices_lie_where_their_barycentrics_say() {
             let root = world.triangles[leaf.triangle as usize];
             for (corner, vertex) in leaf.corners.into_iter().zip(leaf.vertices) {
                 let weights = corner.weights();
-                let interpolate = |array: &Vec3s| {
-                    super::forest::blend(weights, root.map(|v| array.get(v as usize)))
-                };
+                let interpolate =
+                    |array: &Vec3s| blend(weights, root.map(|v| array.get(v as usize)));
                 let pairs = [
                     (
                         interpolate(&world.positions),
@@ -248,7 +248,7 @@ fn dense_error(world: &World, forest: &Forest, colours: &Vec3s) -> f64 {
         let area = f64::from(Bary::doubled_area(leaf.corners)) / f64::from(1 << 30);
         for index in 0..64 {
             let weights = super::estimate::sample_weights(index);
-            let at = |v: [[f32; 3]; 3]| reference::vector(super::forest::blend(weights, v));
+            let at = |v: [[f32; 3]; 3]| reference::vector(blend(weights, v));
             let shaded = reference::shade(
                 at(points),
                 at(normals),
@@ -264,4 +264,27 @@ fn dense_error(world: &World, forest: &Forest, colours: &Vec3s) -> f64 {
         }
     }
     total
+}
+
+#[test]
+fn a_leaf_is_not_split_before_its_midpoints_are_illuminated() {
+    let world = world_of(&shapes::plane(1.0, 1.0, 1, 1));
+    let colours = base_colours(&world);
+    let mut forest = Forest::default();
+    forest.reset(&world);
+    let mut planted = Vec::new();
+    let root = forest
+        .plant(&world, &colours, 0, 10)
+        .expect("there is room");
+    forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+    assert_eq!(planted, [root]);
+    // The first call plants the other half of the square; until that is illuminated nothing can be planned with it.
+    for _ in 0..2 {
+        let outcome = forest.plan_split(&world, &colours, root, 7, |_| 10);
+        assert_eq!(outcome, PlanOutcome::Later);
+    }
+    forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+    assert_eq!(planted.len(), 2);
+    let outcome = forest.plan_split(&world, &colours, root, 7, |_| 10);
+    assert_eq!(outcome, PlanOutcome::Planned);
 }

@@ -92,11 +92,6 @@ impl VertexPool {
         }
     }
 
-    /// Vertices that still have to be illuminated.
-    pub(super) fn unlit(&self) -> usize {
-        self.positions.len() - self.lit
-    }
-
     /// The vertex half way between two of the same object, made if there is none yet.
     pub(super) fn midpoint(&mut self, world: &World, material: u16, a: u32, b: u32) -> u32 {
         let key = [a.min(b), a.max(b)];
