@@ -300,10 +300,9 @@ impl Bench {
 }
 
 fn quarters(patch: &Patch) -> [Patch; 4] {
-    let [a, b, c] = patch.corners;
-    let mid = |p, q| Bary::midpoint(p, q).expect("far above the grid");
-    let (ab, bc, ca) = (mid(a, b), mid(b, c), mid(c, a));
-    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].map(|corners| Patch { corners, ..*patch })
+    Bary::quarters(patch.corners)
+        .expect("far above the grid")
+        .map(|corners| Patch { corners, ..*patch })
 }
 
 /// What the operating system calls the processor.

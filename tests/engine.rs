@@ -122,8 +122,8 @@ fn small_budgets_add_up_to_convergence() {
     let mut frame = Frame::new(SIZE.0, SIZE.1);
     let mut last = f64::INFINITY;
     for round in 0..2000 {
-        let stats = engine.render(&scene, Budget::Work(100_000), &mut frame);
-        assert!(stats.work_units <= 100_000, "{stats:?}");
+        let stats = engine.render(&scene, Budget::Work(50_000), &mut frame);
+        assert!(stats.work_units <= 50_000, "{stats:?}");
         if stats.converged {
             assert!(
                 round > 3,

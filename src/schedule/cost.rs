@@ -15,6 +15,8 @@ pub const VERTEX_NS: f32 = 0.8;
 pub const VERTEX_LIGHT_NS: f32 = 0.85;
 /// Making a leaf, as a root or by a split: edges, midpoints, estimate and bookkeeping, without illumination.
 pub const LEAF_NS: f32 = 455.0;
+/// Putting a triangle, leaf or part on the list of what is to be shaded.
+pub const LIST_NS: f32 = 150.0;
 /// Taking a sample inside a leaf, without its illumination.
 pub const SAMPLE_NS: f32 = 40.0;
 /// Repainting a patch with interpolated colours: a fixed part, and a part for each pixel.

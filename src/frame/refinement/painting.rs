@@ -2,7 +2,7 @@
 
 use super::{Owner, PIECE_UNITS, Paint, Progressing, Refinement, Stage};
 use crate::backend::{Fill, Patch};
-use crate::geometry::Bary;
+use crate::geometry::bary::{self, Bary};
 use crate::refine::{LeafId, LeafState};
 use crate::schedule::{Allowance, cost};
 
@@ -118,30 +118,16 @@ fn painting_limit(stage: &Stage<'_>, allowance: &Allowance<'_>) -> u64 {
 
 /// The patch as four quarters that paint the same, or `None` where the barycentric grid ends.
 fn quarter(patch: &Patch) -> Option<[Patch; 4]> {
-    let [a, b, c] = patch.corners;
-    let mid = [
-        Bary::midpoint(a, b)?,
-        Bary::midpoint(b, c)?,
-        Bary::midpoint(c, a)?,
-    ];
-    let part = |corners: [Bary; 3], weights: [[f32; 3]; 3]| Patch {
-        corners,
-        fill: match patch.fill {
-            Fill::Gouraud(colours) => Fill::Gouraud(weights.map(|w| {
-                std::array::from_fn(|k| {
-                    w[0] * colours[0][k] + w[1] * colours[1][k] + w[2] * colours[2][k]
-                })
-            })),
-            phong @ Fill::Phong { .. } => phong,
-        },
-        ..*patch
+    let fills = match patch.fill {
+        Fill::Gouraud(colours) => {
+            bary::quarters(colours, bary::middles(colours)).map(Fill::Gouraud)
+        }
+        phong @ Fill::Phong { .. } => [phong; 4],
     };
-    let corner = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let middle = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
-    Some([
-        part([a, mid[0], mid[2]], [corner[0], middle[0], middle[2]]),
-        part([mid[0], b, mid[1]], [middle[0], corner[1], middle[1]]),
-        part([mid[2], mid[1], c], [middle[2], middle[1], corner[2]]),
-        part([mid[0], mid[1], mid[2]], middle),
-    ])
+    let corners = Bary::quarters(patch.corners)?;
+    Some(std::array::from_fn(|i| Patch {
+        corners: corners[i],
+        fill: fills[i],
+        ..*patch
+    }))
 }

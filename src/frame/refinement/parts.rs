@@ -8,7 +8,7 @@
 
 use super::{Candidate, Owner, Refinement, Shading, Stage, ranking};
 use crate::backend::{Fill, Patch};
-use crate::geometry::Bary;
+use crate::geometry::bary::{self, Bary, blend};
 use crate::refine::LeafId;
 use crate::schedule::cost;
 
@@ -54,22 +54,12 @@ struct Piece {
 impl Piece {
     /// Its quarters, or `None` where the barycentric grid ends.
     fn quarters(&self) -> Option<[Self; 4]> {
-        let [a, b, c] = self.corners;
-        let mid = [
-            Bary::midpoint(a, b)?,
-            Bary::midpoint(b, c)?,
-            Bary::midpoint(c, a)?,
-        ];
-        let [p, q, r] = self.colours;
-        let half = |u: [f32; 3], v: [f32; 3]| std::array::from_fn(|k| (u[k] + v[k]) * 0.5);
-        let (pq, qr, rp) = (half(p, q), half(q, r), half(r, p));
-        let piece = |corners, colours| Self { corners, colours };
-        Some([
-            piece([a, mid[0], mid[2]], [p, pq, rp]),
-            piece([mid[0], b, mid[1]], [pq, q, qr]),
-            piece([mid[2], mid[1], c], [rp, qr, r]),
-            piece([mid[0], mid[1], mid[2]], [pq, qr, rp]),
-        ])
+        let corners = Bary::quarters(self.corners)?;
+        let colours = bary::quarters(self.colours, bary::middles(self.colours));
+        Some(std::array::from_fn(|i| Self {
+            corners: corners[i],
+            colours: colours[i],
+        }))
     }
 }
 
@@ -137,12 +127,12 @@ impl Refinement {
         let normals = root.map(|v| world.normals.get(v));
         let corners = piece.corners.map(Bary::weights);
         for weights in SAMPLE_WEIGHTS {
-            let in_root = ranking::blend(weights, corners);
+            let in_root = blend(weights, corners);
             self.samples.push(
-                ranking::blend(in_root, positions),
-                ranking::blend(in_root, normals),
+                blend(in_root, positions),
+                blend(in_root, normals),
                 world.triangle_material[triangle as usize],
-                ranking::blend(weights, piece.colours),
+                blend(weights, piece.colours),
             );
         }
         1

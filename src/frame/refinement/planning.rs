@@ -22,15 +22,24 @@ impl Refinement {
             let Some(candidate) = self.queue.pop() else {
                 break;
             };
-            let more = self.planning_cost(stage, candidate);
+            let Some(action) = self.decide(stage, candidate) else {
+                continue;
+            };
+            if let Candidate::Leaf(leaf) = candidate
+                && self.forest.is_in_plan(leaf)
+            {
+                // Something was planned in this piece, so this does not go on for ever.
+                self.deferred.push(candidate);
+                continue;
+            }
+            let more = self.planning_cost(stage, candidate, action);
             let bounds = self.bounds_cost(stage, candidate);
             if !allowance.admits(units + more + bounds) {
                 self.deferred.push(candidate);
                 break;
             }
-            if self.plan(stage, candidate) {
-                units += more + std::mem::take(&mut self.units_for_bounds);
-            }
+            self.plan(stage, candidate, action);
+            units += more + std::mem::take(&mut self.units_for_bounds);
         }
         self.conclude_plans(stage);
         allowance.spend(units);
@@ -42,18 +51,38 @@ impl Refinement {
         units > 0
     }
 
-    fn planning_cost(&self, stage: &Stage<'_>, candidate: Candidate) -> u64 {
-        let lights = stage.world.lights.len();
-        let units = match candidate {
+    /// What to do with a candidate; `None` when it has become void.
+    fn decide(&self, stage: &Stage<'_>, candidate: Candidate) -> Option<Action> {
+        match candidate {
             Candidate::Root(index) => {
-                ranking::planting_cost(self.roots[index as usize].pixels, lights)
+                let root = self.roots[index as usize];
+                // It may have been planted in this very piece, as the neighbour of another.
+                let is_waiting =
+                    root.progress == Progress::Waiting && !self.forest.is_planted(root.triangle);
+                is_waiting.then(|| self.choose_for_root(&root, stage.world.lights.len()).1)
             }
             Candidate::Leaf(leaf) => {
-                let pixels = self.forest.leaf(leaf).pixels;
-                ranking::planting_cost(pixels, lights)
-                    + ranking::cutting_cost(pixels as f32, lights)
+                let is_open = self.forest.leaf(leaf).state == LeafState::Open;
+                is_open.then(|| self.choose(stage, leaf).1)
             }
-            Candidate::Part(part) => {
+            Candidate::Part(_) => Some(Action::Shade),
+        }
+    }
+
+    fn planning_cost(&self, stage: &Stage<'_>, candidate: Candidate, action: Action) -> u64 {
+        let lights = stage.world.lights.len();
+        let units = match (candidate, action) {
+            (Candidate::Root(_), Action::Shade) => cost::LIST_NS,
+            (Candidate::Root(index), Action::Split(_)) => {
+                ranking::planting_cost(self.roots[index as usize].pixels, lights)
+            }
+            (Candidate::Leaf(leaf), Action::Shade) => {
+                ranking::cutting_cost(self.forest.leaf(leaf).pixels as f32, lights)
+            }
+            (Candidate::Leaf(leaf), Action::Split(marks)) => {
+                self.splitting_cost(stage, leaf, marks)
+            }
+            (Candidate::Part(part), _) => {
                 ranking::cutting_cost(self.parts[part as usize].pixels, lights)
             }
         };
@@ -76,36 +105,17 @@ impl Refinement {
         }
     }
 
-    /// Takes a candidate up. False when it has become void.
-    fn plan(&mut self, stage: &Stage<'_>, candidate: Candidate) -> bool {
+    /// Takes a candidate up.
+    fn plan(&mut self, stage: &Stage<'_>, candidate: Candidate, action: Action) {
         match candidate {
-            Candidate::Root(index) => {
-                let root = self.roots[index as usize];
-                // It may have been planted in this very piece, as the neighbour of another.
-                let is_waiting =
-                    root.progress == Progress::Waiting && !self.forest.is_planted(root.triangle);
-                if is_waiting {
-                    self.plan_root(stage, index);
-                }
-                is_waiting
-            }
-            Candidate::Leaf(leaf) => {
-                let is_open = self.forest.leaf(leaf).state == LeafState::Open;
-                if is_open {
-                    self.plan_leaf(stage, leaf);
-                }
-                is_open
-            }
-            Candidate::Part(part) => {
-                self.plan_part(stage, part);
-                true
-            }
+            Candidate::Root(index) => self.plan_root(stage, index, action),
+            Candidate::Leaf(leaf) => self.plan_leaf(stage, leaf, action),
+            Candidate::Part(part) => self.plan_part(stage, part),
         }
     }
 
-    fn plan_root(&mut self, stage: &Stage<'_>, index: u32) {
+    fn plan_root(&mut self, stage: &Stage<'_>, index: u32, action: Action) {
         let root = self.roots[index as usize];
-        let (_, action) = self.choose_for_root(&root, stage.world.lights.len());
         let colours = stage.base.colours();
         // Without room for another leaf it is shaded, too.
         let is_planted = action != Action::Shade
@@ -118,11 +128,8 @@ impl Refinement {
         }
     }
 
-    fn plan_leaf(&mut self, stage: &Stage<'_>, leaf: LeafId) {
-        if self.forest.is_in_plan(leaf) {
-            return self.deferred.push(Candidate::Leaf(leaf));
-        }
-        let marks = match self.choose(stage, leaf).1 {
+    fn plan_leaf(&mut self, stage: &Stage<'_>, leaf: LeafId, action: Action) {
+        let marks = match action {
             Action::Shade if parts::is_large(self.forest.leaf(leaf).pixels as f32) => {
                 return self.cut_into_parts(stage, leaf);
             }
@@ -144,7 +151,7 @@ impl Refinement {
         {
             PlanOutcome::Planned => {}
             PlanOutcome::Later => self.deferred.push(Candidate::Leaf(leaf)),
-            PlanOutcome::Never => self.shade_leaf(stage, leaf),
+            PlanOutcome::Never => self.plan_leaf(stage, leaf, Action::Shade),
         }
     }
 

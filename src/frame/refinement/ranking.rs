@@ -52,11 +52,6 @@ pub(super) fn prior_error(world: &World, colours: &Vec3s, triangle: u32, is_pht:
     contrast * contrast / 1024.0 + highlight + ERROR_FLOOR
 }
 
-/// The weighted sum of three vectors.
-pub(super) fn blend(weights: [f32; 3], v: [[f32; 3]; 3]) -> [f32; 3] {
-    std::array::from_fn(|k| weights[0] * v[0][k] + weights[1] * v[1][k] + weights[2] * v[2][k])
-}
-
 /// Nominal cost of making a triangle or leaf of `pixels` pixels a leaf that can be split.
 pub(super) fn planting_cost(pixels: u32, lights: usize) -> f32 {
     cost::leaves(1.0, POINTS_PER_LEAF, lights) + cost::samples(sample_count(pixels), lights)
@@ -67,7 +62,7 @@ pub(super) fn cutting_cost(pixels: f32, lights: usize) -> f32 {
     if parts::is_large(pixels) {
         cost::samples(CUT * SAMPLES_PER_PART, lights)
     } else {
-        cost::SAMPLE_NS
+        cost::LIST_NS
     }
 }
 
@@ -115,7 +110,7 @@ impl Refinement {
             return (shade, Action::Shade);
         }
         let mut benefit = pixels * error * (1.0 - kept);
-        let mut split_cost = split_cost(pixels, marks.count_ones(), lights);
+        let mut splitting = split_cost(pixels, marks.count_ones(), lights);
         for k in (0..3).filter(|k| marks >> k & 1 == 1) {
             for (neighbour, edge) in self.forest.neighbours(stage.world, id, k) {
                 let other = self.forest.leaf(neighbour);
@@ -125,15 +120,30 @@ impl Refinement {
                     let share = surplus[edge] * surplus[edge] / total;
                     benefit += other.pixels as f32 * other.error * share * (15.0 / 16.0);
                 }
-                split_cost += self::split_cost(other.pixels as f32, 1, lights);
+                splitting += split_cost(other.pixels as f32, 1, lights);
             }
         }
-        let split = benefit / split_cost;
+        let split = benefit / splitting;
         if split >= shade {
             (split, Action::Split(marks))
         } else {
             (shade, Action::Shade)
         }
+    }
+
+    /// Nominal cost of planning to split marked edges of a leaf: of the children it will have, and of those of the leaves
+    /// at these edges.
+    pub(super) fn splitting_cost(&self, stage: &Stage<'_>, id: LeafId, marks: u8) -> f32 {
+        let lights = stage.world.lights.len();
+        let mut children = marks.count_ones() + 1;
+        let mut samples = sample_count(self.forest.leaf(id).pixels);
+        for k in (0..3).filter(|k| marks >> k & 1 == 1) {
+            for (neighbour, _) in self.forest.neighbours(stage.world, id, k) {
+                children += 2;
+                samples += sample_count(self.forest.leaf(neighbour).pixels);
+            }
+        }
+        cost::leaves(children as f32, POINTS_PER_LEAF, lights) + cost::samples(samples, lights)
     }
 
     /// How many lights a triangle's pixels are shaded under, as far as is known.
