@@ -10,7 +10,7 @@ use crate::clock::{Clock, SystemClock};
 use crate::output::Frame;
 use crate::parallel::Exec;
 use crate::scene::{Scene, View, World};
-use crate::schedule::{Allowance, Budget, cost};
+use crate::schedule::{Allowance, Budget, LearnedRate, cost};
 use crate::simd::SimdLevel;
 use std::sync::Arc;
 
@@ -92,8 +92,13 @@ struct Renderer {
     shown: Option<View>,
     base: BaseImage,
     refinement: Refinement,
+    /// Time per pixel handed over to the caller.
+    presenting: LearnedRate,
     frames: u64,
 }
+
+/// A frame of fewer pixels handed over does not tell how long one takes.
+const LEAST_PIXELS_TO_LEARN_FROM: u64 = 1 << 15;
 
 impl Engine {
     /// An engine with default options, made ready for `scene`: vertices welded, clusters and bounding volumes built.
@@ -138,6 +143,7 @@ impl Engine {
                 backend: Box::new(SoftwareBackend::new()),
                 shown: None,
                 refinement: Refinement::default(),
+                presenting: LearnedRate::new(cost::PRESENT_PIXEL_NS, LEAST_PIXELS_TO_LEARN_FROM),
                 frames: 0,
             },
         })
@@ -207,6 +213,8 @@ impl Renderer {
         let pixels_written = self.backend.present(exec, frame);
         let frame_ms = allowance.elapsed_ms();
         stages.resolve += frame_ms - presenting_since;
+        self.presenting
+            .learn(pixels_written, frame_ms - presenting_since);
 
         let converged = !self.method.is_progressive() || self.refinement.is_finished();
         let mut stats = FrameStats {
@@ -306,7 +314,7 @@ impl Renderer {
         };
         loop {
             let pending = stage.backend.pending_pixels(frame);
-            allowance.reserve_ms(f64::from(cost::present(pending, exec.threads)) * 1e-6);
+            allowance.reserve_ms(self.presenting.predict_ms(pending));
             if !self.refinement.step(&mut stage, allowance) {
                 break;
             }

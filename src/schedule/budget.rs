@@ -12,7 +12,8 @@ pub enum Budget {
     /// a first image that takes longer is completed late, and the outcome says so.
     Millis(f64),
     /// Work units: nominal nanoseconds of refinement (see [`cost`](super::cost)). The result is the same, bit for
-    /// bit, for any number of threads and at any speed of the machine.
+    /// bit, for any number of threads and at any speed of the machine. A step is done whole or not at all, and the best
+    /// one comes first: less than some 20,000 units a frame (100,000 with a hundred lights) may get nowhere.
     Work(u64),
     /// Refine until the image equals per-pixel Phong shading.
     Unlimited,

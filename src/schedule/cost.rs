@@ -34,7 +34,7 @@ pub const PHONG_PIXEL_LIGHT_NS: f32 = 0.84;
 pub const BOUNDS_NS: f32 = 190.0;
 /// See [`BOUNDS_NS`].
 pub const BOUNDS_LIGHT_NS: f32 = 153.0;
-/// Copying a pixel into the caller's frame.
+/// Copying a pixel into the caller's frame, until the engine has measured it: see [`LearnedRate`](super::LearnedRate).
 pub const PRESENT_PIXEL_NS: f32 = 0.4;
 
 /// Illuminating `vertices` points under `lights` lights.
@@ -77,12 +77,4 @@ pub fn bounds(lights: usize) -> f32 {
 #[must_use]
 pub fn light_saved(pixels: f32) -> f32 {
     pixels * PHONG_PIXEL_LIGHT_NS
-}
-
-/// Copying `pixels` pixels into the caller's frame on `threads` threads. About half of it is memory bandwidth, which threads
-/// share.
-#[must_use]
-pub fn present(pixels: u64, threads: usize) -> f32 {
-    let share = 0.5 + 0.5 / threads.max(1) as f32;
-    pixels as f32 * PRESENT_PIXEL_NS * share
 }

@@ -11,6 +11,8 @@
 mod budget;
 pub mod cost;
 mod queue;
+mod rate;
 
 pub use budget::{Allowance, Budget};
 pub use queue::RankedQueue;
+pub use rate::LearnedRate;
