@@ -26,3 +26,8 @@ pub use frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
 pub use output::Frame;
 pub use scene::Scene;
 pub use schedule::Budget;
+
+/// The examples of the README, compiled and run as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;
