@@ -21,7 +21,7 @@ Examples:
   specula render scenes/teapot.ron -o teapot.png --budget 2 --frames 8
   specula sweep scenes/teapot.ron --methods all --csv teapot.csv
 
-Exit status: 0 done, 1 failed, 2 bad usage or bad input.")]
+Exit status: 0 done, 1 failed (also: a file cannot be read or written), 2 bad usage or bad input.")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     pub(super) command: Command,
@@ -41,6 +41,8 @@ pub(super) enum Command {
 #[command(after_help = "\
 Each frame goes on refining where the last one stopped, until the image equals per-pixel Phong
 shading. Without --budget and --work the first frame refines until then.
+
+PHTs are potentially highlighted triangles: those that pass the paper's test for a highlight's centre.
 
 Examples:
   Converge, and write the final image:

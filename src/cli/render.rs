@@ -86,6 +86,14 @@ fn compare(
     ErrorReport::compare(frame, &reference).map_err(|error| Failure::runtime(error.to_string()))
 }
 
+/// What a counter of skipped things is called on the screen.
+fn label(name: &str) -> String {
+    match name {
+        "triangles_off_screen" => "triangles off screen or between pixels".to_owned(),
+        _ => name.replace('_', " "),
+    }
+}
+
 /// What is printed of a frame.
 #[derive(Debug)]
 struct FrameReport {
@@ -154,7 +162,7 @@ impl FrameReport {
                 list(stages(&stats.stage_ms).map(|(name, ms)| format!("{name} {ms:.2}"))) + " ms"
             ),
             format!(
-                "  triangles  {} in the scene, {} drawn, {} visible, {} subdivided into {} parts",
+                "  triangles  {} in the scene, {} drawn, {} visible, {} subdivided; {} leaves open",
                 stats.triangles,
                 stats.triangles_drawn,
                 stats.triangles_visible,
@@ -211,7 +219,7 @@ impl FrameReport {
             .entries()
             .into_iter()
             .filter(|&(_, count)| count > 0)
-            .map(|(name, count)| format!("{} {count}", name.replace('_', " ")));
+            .map(|(name, count)| format!("{} {count}", label(name)));
         let text = list(counted);
         if text.is_empty() {
             "nothing".to_owned()

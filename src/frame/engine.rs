@@ -218,7 +218,7 @@ impl Renderer {
 
         let converged = !self.method.is_progressive() || self.refinement.is_finished();
         let mut stats = FrameStats {
-            frame: self.frames,
+            frame: self.frames + 1,
             frame_ms,
             outcome: match (is_new, allowance.spent_units(), converged) {
                 (false, 0, _) => Outcome::Unchanged,

@@ -102,7 +102,7 @@ impl Skipped {
 /// Times and work are this frame's; counts of triangles and candidates describe the image it left behind.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameStats {
-    /// Frames this engine has rendered before.
+    /// Number of the frame, the engine's first being 1.
     pub frame: u64,
     /// Milliseconds from call to return.
     pub frame_ms: f64,
@@ -113,7 +113,7 @@ pub struct FrameStats {
     /// Whether the image is final.
     pub converged: bool,
     /// Estimated root mean square difference from per-pixel Phong shading, in 8-bit codes over covered pixels; 0
-    /// for [`Method::Phong`](super::Method::Phong). For flat shading, which is not compared with anything, NaN.
+    /// for [`Method::Phong`](super::Method::Phong). NaN for flat and Gouraud shading, where nothing is estimated.
     pub estimated_error: f64,
     /// Triangles of the scene.
     pub triangles: u64,
@@ -132,7 +132,7 @@ pub struct FrameStats {
     pub refined: u64,
     /// Triangles subdivided so far.
     pub triangles_subdivided: u64,
-    /// Leaves of all subdivisions.
+    /// Leaves of subdivisions that are not right yet: still to be refined, unlike those shaded per pixel.
     pub leaves: u64,
     /// Pixels shaded by the illumination equation so far.
     pub phong_pixels: u64,
@@ -189,7 +189,7 @@ impl fmt::Display for FrameStats {
             f,
             "frame {}: {} in {:.2} ms, error about {:.2} codes, {} of {} visible PHTs refined",
             self.frame,
-            self.outcome,
+            self.outcome.name().replace('_', " "),
             self.frame_ms,
             self.estimated_error,
             self.refined,
