@@ -21,7 +21,7 @@
 //!   of the children is below that of the parents *at the same points* is it [committed](Forest::conclude_splits).
 //!
 //! Leaves that have been shaded per pixel are [closed](Forest::close): they are right already, so their edges no longer
-//! count.
+//! count, nor do those of triangles without a visible pixel. A backend without ids has neither, and needs both to follow.
 
 pub mod estimate;
 mod forest;

@@ -1,6 +1,7 @@
 //! Refinement: what could be done next, what it is worth, and doing it piece by piece.
 //!
-//! Work comes in two kinds of pieces, each about [`PIECE_UNITS`] long, between which the clock is looked at:
+//! Work comes in two kinds of pieces, each about [`PIECE_UNITS`] long (painting by several threads longer while the deadline
+//! is far away), and none is begun that the budget does not admit:
 //!
 //! * A **planning** piece takes the best candidates off the queue. A triangle not looked at yet becomes the root of a
 //!   subdivision, its error estimated from samples; a leaf is split further, or is to be shaded per pixel, whichever
@@ -30,7 +31,7 @@ use crate::schedule::{Allowance, RankedQueue};
 use parts::Part;
 use std::collections::VecDeque;
 
-/// Nominal nanoseconds between two looks at the clock.
+/// Nominal nanoseconds of a piece.
 const PIECE_UNITS: u64 = 50_000;
 
 /// A triangle of fewer pixels is ranked by its corners alone: a sample would cost as much as shading some of them.
@@ -110,7 +111,7 @@ struct Paint {
     units: u32,
 }
 
-/// A leaf's patches that are still to be painted, and its pixels counted so far.
+/// A leaf's patches that are still to be painted, or its parts still to be shaded, and its pixels counted so far.
 #[derive(Clone, Copy, Debug, Default)]
 struct Progressing {
     patches: u32,
@@ -127,8 +128,8 @@ pub(super) struct Refinement {
     root_of_triangle: Vec<u32>,
     paints: VecDeque<Paint>,
     parts: Vec<Part>,
-    /// Parts whose samples have not been evaluated.
-    fresh_parts: usize,
+    /// How many of `parts` have been ranked; the samples of the others are still to be evaluated.
+    ranked_parts: usize,
     /// Triangles are shaded per pixel in the order of their area ([`Method::PhongArea`]).
     by_area: bool,
     /// By leaf.
@@ -166,7 +167,7 @@ impl Refinement {
         self.progressing.clear();
         self.parts.clear();
         self.samples.clear();
-        self.fresh_parts = 0;
+        self.ranked_parts = 0;
         self.error_mass = 0.0;
         self.counters = Counters::default();
     }

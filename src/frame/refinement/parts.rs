@@ -140,12 +140,12 @@ impl Refinement {
 
     /// Evaluates the samples of parts made since the last call, and makes the parts candidates.
     pub(super) fn rank_parts(&mut self, stage: &Stage<'_>) {
-        if self.fresh_parts == self.parts.len() {
+        if self.ranked_parts == self.parts.len() {
             return;
         }
         self.samples
             .illuminate(stage.exec, stage.world, stage.view.eye);
-        let fresh = std::mem::replace(&mut self.fresh_parts, self.parts.len());
+        let fresh = std::mem::replace(&mut self.ranked_parts, self.parts.len());
         for (order, index) in (fresh..self.parts.len()).enumerate() {
             let first = order * SAMPLES_PER_PART;
             let square = |sample| {
