@@ -128,7 +128,7 @@ impl Bench {
         );
         let scene = Scene::parse(&text, "bench").expect("a valid scene");
         let world = World::new(&scene);
-        let view = world.view(&scene.camera, SIZE.0, SIZE.1);
+        let view = world.view(scene.camera(), SIZE.0, SIZE.1);
         let mut colours = Vec3s::default();
         colours.resize(world.positions.len());
         let vertices: Vec<u32> = (0..world.positions.len() as u32).collect();

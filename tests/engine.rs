@@ -64,7 +64,7 @@ fn render(
 
 fn reference(scene: &Scene) -> ReferenceImage {
     let world = specula::scene::World::new(scene);
-    let view = world.view(&scene.camera, SIZE.0, SIZE.1);
+    let view = world.view(scene.camera(), SIZE.0, SIZE.1);
     ReferenceImage::render(&world, &view, 2)
 }
 
@@ -284,7 +284,9 @@ fn another_camera_size_or_scene_starts_anew() {
     let mut engine = engine(&scene, options(Method::Adaptive, 1));
     let mut frame = Frame::new(SIZE.0, SIZE.1);
     engine.render(&scene, Budget::Unlimited, &mut frame);
-    scene.camera.position.x += 1.0;
+    let mut camera = *scene.camera();
+    camera.position.x += 1.0;
+    scene.set_camera(camera);
     let moved = engine.render(&scene, Budget::Unlimited, &mut frame);
     assert_eq!(moved.outcome, Outcome::Complete);
     let (expected, _) = render(&scene, Method::Adaptive, 1, &[Budget::Unlimited]);

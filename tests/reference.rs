@@ -26,9 +26,9 @@ fn scenes() -> Vec<(String, Scene)> {
         }
         let scene = Scene::load(&path).expect("a shipped scene is valid");
         let mut close = scene.clone();
-        let camera = &mut close.camera;
+        let mut camera = *scene.camera();
         camera.position = camera.target + (camera.position - camera.target) * 0.2;
-        close.touch();
+        close.set_camera(camera);
         let name = path.display().to_string();
         scenes.push((format!("{name}, close"), close));
         scenes.push((name, scene));
@@ -41,7 +41,7 @@ fn scenes() -> Vec<(String, Scene)> {
 fn the_rasterizer_gives_each_triangle_the_pixels_that_the_rules_give_it() {
     for (name, scene) in scenes() {
         let world = World::new(&scene);
-        let view = world.view(&scene.camera, SIZE[0], SIZE[1]);
+        let view = world.view(scene.camera(), SIZE[0], SIZE[1]);
         let reference = ReferenceImage::render(&world, &view, 2);
         let mut expected = vec![0; world.triangles.len()];
         for &id in reference.ids.iter().filter(|&&id| id != NO_TRIANGLE) {
@@ -77,7 +77,7 @@ fn phong_shading_is_within_a_code_of_the_reference() {
         let mut engine = Engine::with_options(&scene, options).expect("one thread");
         let mut frame = Frame::new(SIZE[0], SIZE[1]);
         engine.render(&scene, Budget::Unlimited, &mut frame);
-        let view = engine.world().view(&scene.camera, SIZE[0], SIZE[1]);
+        let view = engine.world().view(scene.camera(), SIZE[0], SIZE[1]);
         let reference = ReferenceImage::render(engine.world(), &view, 2);
         let error = ErrorReport::compare(&frame, &reference).expect("same size");
         assert!(error.max <= 1, "{name}: {error:?}");

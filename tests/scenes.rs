@@ -38,7 +38,7 @@ fn load(name: &str) -> Scene {
 }
 
 fn view(scene: &Scene, world: &World) -> View {
-    world.view(&scene.camera, WIDTH, HEIGHT)
+    world.view(scene.camera(), WIDTH, HEIGHT)
 }
 
 /// Where a vertex appears, in pixels, if it is between the near and far planes.

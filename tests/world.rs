@@ -1,7 +1,9 @@
 //! From author space to pixels: nothing may be lost on the way, whatever the size and place of the scene.
 
 use glam::{DMat3, DMat4, DVec3};
-use specula::scene::{Camera, Eye, LightKind, Object, Projection, Scene, World};
+use specula::scene::{
+    Camera, Eye, Light, LightKind, Material, Object, Projection, Revisions, Scene, World,
+};
 
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 360;
@@ -23,19 +25,29 @@ fn placed(size: f64, offset: DVec3) -> Scene {
         )",
     );
     let map = |p: DVec3| p * size + offset;
-    scene.camera.position = map(scene.camera.position);
-    scene.camera.target = map(scene.camera.target);
-    for light in &mut scene.lights {
+    let camera = *scene.camera();
+    scene.set_camera(Camera {
+        position: map(camera.position),
+        target: map(camera.target),
+        ..camera
+    });
+    for (index, mut light) in scene.lights().to_vec().into_iter().enumerate() {
         if let LightKind::Point { position } = &mut light.kind {
             *position = map(*position);
+            scene.set_light(index, light);
         }
     }
-    for object in &mut scene.objects {
-        object.author_from_mesh = DMat4::from_translation(offset)
-            * DMat4::from_scale(DVec3::splat(size))
-            * object.author_from_mesh;
-    }
-    scene.touch();
+    let moved = DMat4::from_translation(offset) * DMat4::from_scale(DVec3::splat(size));
+    scene.set_objects(
+        scene
+            .objects()
+            .iter()
+            .map(|object| Object {
+                author_from_mesh: moved * object.author_from_mesh,
+                ..object.clone()
+            })
+            .collect(),
+    );
     scene
 }
 
@@ -61,7 +73,7 @@ fn world_space_leads_back_to_author_space() {
     assert_eq!(world.world_from_author_scale.log2().fract(), 0.0);
     assert!((0.25..=1.0).contains(&world.radius), "{}", world.radius);
     let mut vertex = 0;
-    for object in &scene.objects {
+    for object in scene.objects() {
         for &p in &object.mesh.positions {
             let expected = object.author_from_mesh.transform_point3(p);
             let back =
@@ -80,7 +92,7 @@ fn world_space_leads_back_to_author_space() {
 fn size_and_place_of_a_scene_do_not_change_its_image() {
     let reference_scene = placed(1.0, DVec3::ZERO);
     let reference = World::new(&reference_scene);
-    let reference_view = reference.view(&reference_scene.camera, WIDTH, HEIGHT);
+    let reference_view = reference.view(reference_scene.camera(), WIDTH, HEIGHT);
     for (size, offset) in [
         (1e-12, DVec3::ZERO),
         (1e12, DVec3::ZERO),
@@ -90,7 +102,7 @@ fn size_and_place_of_a_scene_do_not_change_its_image() {
     ] {
         let scene = placed(size, offset);
         let world = World::new(&scene);
-        let view = world.view(&scene.camera, WIDTH, HEIGHT);
+        let view = world.view(scene.camera(), WIDTH, HEIGHT);
         for vertex in 0..world.positions.len() {
             let (a, b) = (
                 view.project(world.positions.get(vertex)),
@@ -117,7 +129,7 @@ fn size_and_place_of_a_scene_do_not_change_its_image() {
 fn the_target_is_in_the_middle_up_is_up_and_right_is_right() {
     let scene = placed(1.0, DVec3::ZERO);
     let world = World::new(&scene);
-    let mut camera = scene.camera;
+    let mut camera = *scene.camera();
     for projection in [
         Projection::Perspective { fov_degrees: 30.0 },
         Projection::Orthographic { height: 8.0 },
@@ -139,7 +151,7 @@ fn the_target_is_in_the_middle_up_is_up_and_right_is_right() {
 fn the_opening_angle_and_the_height_reach_the_border_of_the_image() {
     let scene = placed(1.0, DVec3::ZERO);
     let world = World::new(&scene);
-    let mut camera = scene.camera;
+    let mut camera = *scene.camera();
     let forward = (camera.target - camera.position).normalize();
     let right = forward.cross(camera.up).normalize();
     let up = right.cross(forward);
@@ -166,7 +178,7 @@ fn the_opening_angle_and_the_height_reach_the_border_of_the_image() {
 fn reversed_depth_is_one_at_the_near_plane_and_zero_at_the_far_plane() {
     let scene = placed(1.0, DVec3::ZERO);
     let world = World::new(&scene);
-    let mut camera = scene.camera;
+    let mut camera = *scene.camera();
     let forward = (camera.target - camera.position).normalize();
     (camera.near, camera.far) = (Some(2.0), Some(50.0));
     for projection in [
@@ -186,14 +198,14 @@ fn fitted_planes_hold_the_scene_wherever_the_camera_is() {
     let scene = placed(1.0, DVec3::ZERO);
     let world = World::new(&scene);
     for camera in [
-        scene.camera,
+        *scene.camera(),
         Camera {
             position: DVec3::new(0.0, -1e7, 0.0),
-            ..scene.camera
+            ..*scene.camera()
         },
         Camera {
             projection: Projection::Orthographic { height: 8.0 },
-            ..scene.camera
+            ..*scene.camera()
         },
     ] {
         let view = world.view(&camera, WIDTH, HEIGHT);
@@ -208,7 +220,7 @@ fn fitted_planes_hold_the_scene_wherever_the_camera_is() {
             let camera = Camera {
                 position: eye,
                 target,
-                ..scene.camera
+                ..*scene.camera()
             };
             let matrix = world.view(&camera, WIDTH, HEIGHT).pixel_from_world;
             assert!(matrix.is_finite() && matrix.determinant() != 0.0);
@@ -239,7 +251,7 @@ fn one_given_plane_never_contradicts_the_fitted_other() {
                 projection,
                 near,
                 far,
-                ..scene.camera
+                ..*scene.camera()
             };
             let forward = (camera.target - camera.position).normalize();
             let depth =
@@ -258,7 +270,7 @@ fn one_given_plane_never_contradicts_the_fitted_other() {
 fn a_view_without_a_direction_or_a_size_is_still_finite() {
     let scene = placed(1.0, DVec3::ZERO);
     let world = World::new(&scene);
-    let mut camera = scene.camera;
+    let mut camera = *scene.camera();
     camera.target = camera.position;
     assert!(
         world
@@ -266,7 +278,7 @@ fn a_view_without_a_direction_or_a_size_is_still_finite() {
             .pixel_from_world
             .is_finite()
     );
-    camera = scene.camera;
+    camera = *scene.camera();
     camera.up = camera.target - camera.position;
     assert!(
         world
@@ -274,9 +286,14 @@ fn a_view_without_a_direction_or_a_size_is_still_finite() {
             .pixel_from_world
             .is_finite()
     );
-    assert!(world.view(&scene.camera, 0, 0).pixel_from_world.is_finite());
+    assert!(
+        world
+            .view(scene.camera(), 0, 0)
+            .pixel_from_world
+            .is_finite()
+    );
     let mut empty = scene.clone();
-    empty.objects.clear();
+    empty.set_objects(Vec::new());
     let world = World::new(&empty);
     assert!(world.triangles.is_empty());
     assert!(
@@ -335,12 +352,12 @@ fn rotations_are_about_x_then_y_then_z() {
     );
     let turn = |object: &Object, v: DVec3| object.author_from_mesh.transform_vector3(v);
     // z goes to -y under x, where the turn about y leaves it; y goes to z, then to x.
-    assert_eq!(turn(&scene.objects[0], DVec3::Z), -DVec3::Y);
-    assert_eq!(turn(&scene.objects[0], DVec3::Y), DVec3::X);
+    assert_eq!(turn(&scene.objects()[0], DVec3::Z), -DVec3::Y);
+    assert_eq!(turn(&scene.objects()[0], DVec3::Y), DVec3::X);
     // 450 degrees are 90: z goes to x, and then under z by -90 to -y.
-    assert_eq!(turn(&scene.objects[1], DVec3::Z), -DVec3::Y);
+    assert_eq!(turn(&scene.objects()[1], DVec3::Z), -DVec3::Y);
     let any = parse("(objects: [(shape: Box(), rotate_degrees: (12, -345, 678.9))])");
-    let m = DMat3::from_mat4(any.objects[0].author_from_mesh);
+    let m = DMat3::from_mat4(any.objects()[0].author_from_mesh);
     let z_y_x = DMat3::from_rotation_z(678.9_f64.to_radians())
         * DMat3::from_rotation_y((-345_f64).to_radians())
         * DMat3::from_rotation_x(12_f64.to_radians());
@@ -376,11 +393,11 @@ fn the_viewer_is_a_point_or_a_direction() {
         "(camera: Orthographic(position: (0, -9, 0), target: (0, 0, 0)), objects: [(shape: Sphere())])",
     );
     let world = World::new(&scene);
-    let Eye::Direction(towards) = world.view(&scene.camera, WIDTH, HEIGHT).eye else {
+    let Eye::Direction(towards) = world.view(scene.camera(), WIDTH, HEIGHT).eye else {
         panic!("an orthographic viewer is in a direction");
     };
     assert!(DVec3::from(towards.map(f64::from)).distance(-DVec3::Y) < 1e-6);
-    let mut camera = scene.camera;
+    let mut camera = *scene.camera();
     camera.projection = Projection::Perspective { fov_degrees: 1.0 };
     let expected = world
         .world_from_author(camera.position)
@@ -405,8 +422,8 @@ fn clusters_partition_each_object_and_keep_its_triangles() {
     }
     assert_eq!(next as usize, world.triangles.len());
     // Reordering keeps the set of triangles: each object's vertices stay its own.
-    let split = scene.objects[0].mesh.triangles.len();
-    let vertices = scene.objects[0].mesh.positions.len() as u32;
+    let split = scene.objects()[0].mesh.triangles.len();
+    let vertices = scene.objects()[0].mesh.positions.len() as u32;
     for (index, t) in world.triangles.iter().enumerate() {
         assert!(t.iter().all(|&v| (v < vertices) == (index < split)));
     }
@@ -422,14 +439,18 @@ fn materials_are_premultiplied_and_default_ones_are_shared() {
             objects: [(shape: Box()), (shape: Box(), material: "red"), (shape: Box())],
         )"##,
     );
-    assert_eq!(scene.materials.len(), 2);
+    assert_eq!(scene.materials().len(), 2);
     assert_eq!(
-        scene.objects.iter().map(|o| o.material).collect::<Vec<_>>(),
+        scene
+            .objects()
+            .iter()
+            .map(|o| o.material)
+            .collect::<Vec<_>>(),
         [1, 0, 1]
     );
     assert!(std::sync::Arc::ptr_eq(
-        &scene.objects[0].mesh,
-        &scene.objects[2].mesh
+        &scene.objects()[0].mesh,
+        &scene.objects()[2].mesh
     ));
     let world = World::new(&scene);
     let red = world.materials[0];
@@ -441,31 +462,120 @@ fn materials_are_premultiplied_and_default_ones_are_shared() {
 }
 
 #[test]
-fn a_change_gives_a_new_identity() {
-    let mut scene = parse("(objects: [(shape: Box())])");
-    let other = parse("(objects: [(shape: Box())])");
-    assert_ne!(scene.id(), other.id());
+fn each_setter_gives_its_part_a_new_revision_and_no_other() {
+    let mut scene = parse("(objects: [(shape: Box()), (shape: Box())])");
+    let other = parse("(objects: [(shape: Box()), (shape: Box())])");
+    assert_ne!(scene.revisions().objects, other.revisions().objects);
     let copy = scene.clone();
-    assert_eq!(scene.id(), copy.id());
-    scene.ambient = [0.0; 3];
-    scene.touch();
-    assert_ne!(scene.id(), copy.id());
+    assert_eq!(scene.revisions(), copy.revisions());
+
+    // Every setter, with what has to change besides the parts it leaves alone.
+    type Change = (fn(&mut Scene), fn(&mut Revisions, Revisions));
+    let changes: [Change; 9] = [
+        (
+            |scene| {
+                let camera = *scene.camera();
+                scene.set_camera(Camera {
+                    position: camera.position * 2.0,
+                    ..camera
+                });
+            },
+            |old, new| old.camera = new.camera,
+        ),
+        (
+            |scene| scene.set_background([0.5; 3]),
+            |old, new| old.background = new.background,
+        ),
+        (
+            |scene| scene.set_ambient([0.0; 3]),
+            |old, new| old.materials = new.materials,
+        ),
+        (
+            |scene| {
+                let light = scene.lights()[0];
+                scene.set_light(
+                    1,
+                    Light {
+                        radiance: [0.25; 3],
+                        ..light
+                    },
+                );
+            },
+            |old, new| old.lights = new.lights,
+        ),
+        (
+            |scene| scene.set_lights(Vec::new()),
+            |old, new| old.lights = new.lights,
+        ),
+        (
+            |scene| {
+                let material = scene.materials()[0];
+                scene.set_material(
+                    0,
+                    Material {
+                        shininess: 3.0,
+                        ..material
+                    },
+                );
+            },
+            |old, new| old.materials = new.materials,
+        ),
+        (
+            |scene| {
+                let material = scene.materials()[0];
+                assert_eq!(scene.add_material(material), 1);
+            },
+            |old, new| old.materials = new.materials,
+        ),
+        (
+            |scene| scene.set_transform(1, DMat4::from_scale(DVec3::splat(2.0))),
+            |old, new| old.transforms = new.transforms,
+        ),
+        (
+            |scene| scene.set_object_material(0, 1),
+            |old, new| old.objects = new.objects,
+        ),
+    ];
+    for (index, (change, allowed)) in changes.into_iter().enumerate() {
+        let mut before = scene.revisions();
+        change(&mut scene);
+        let after = scene.revisions();
+        assert_ne!(before, after, "change {index}");
+        allowed(&mut before, after);
+        assert_eq!(before, after, "change {index}");
+    }
+    assert_eq!(copy.revisions().camera, copy.clone().revisions().camera);
+}
+
+#[test]
+fn setting_what_is_there_already_changes_nothing() {
+    let mut scene = placed(1.0, DVec3::ZERO);
+    let before = scene.revisions();
+    scene.set_camera(*scene.camera());
+    scene.set_background(scene.background());
+    scene.set_ambient(scene.ambient());
+    scene.set_lights(scene.lights().to_vec());
+    scene.set_light(0, scene.lights()[0]);
+    scene.set_material(0, scene.materials()[0]);
+    scene.set_transform(1, scene.objects()[1].author_from_mesh);
+    scene.set_object_material(0, scene.objects()[0].material);
+    assert_eq!(scene.revisions(), before);
 }
 
 #[test]
 fn a_material_index_out_of_range_does_no_harm() {
     let mut scene = parse("(objects: [(shape: Box())])");
-    scene.objects[0].material = 99;
+    scene.set_object_material(0, 99);
     assert!(World::new(&scene).vertex_material.iter().all(|&m| m == 0));
-    scene.materials.clear();
-    assert_eq!(World::new(&scene).materials.len(), 1);
+    let bare = Scene::new(Vec::new(), scene.objects().to_vec());
+    assert_eq!(World::new(&bare).materials.len(), 1);
 }
 
 #[test]
 fn a_face_seen_from_outside_turns_counter_clockwise_on_the_screen() {
     let scene = parse("(objects: [(shape: Sphere(slices: 12, stacks: 6))])");
     let world = World::new(&scene);
-    let view = world.view(&scene.camera, WIDTH, HEIGHT);
+    let view = world.view(scene.camera(), WIDTH, HEIGHT);
     let Eye::Point(eye) = view.eye else {
         panic!("the default camera is a perspective one");
     };

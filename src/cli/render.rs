@@ -81,7 +81,7 @@ fn compare(
     let progress = Progress::new(0);
     progress.doing("rendering the Phong reference");
     let world = engine.world();
-    let view = world.view(&scene.camera, frame.width(), frame.height());
+    let view = world.view(scene.camera(), frame.width(), frame.height());
     let reference = ReferenceImage::render(world, &view, args.machine.thread_count());
     ErrorReport::compare(frame, &reference).map_err(|error| Failure::runtime(error.to_string()))
 }

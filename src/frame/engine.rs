@@ -9,7 +9,7 @@ use crate::backend::software::SoftwareBackend;
 use crate::clock::{Clock, SystemClock};
 use crate::output::Frame;
 use crate::parallel::Exec;
-use crate::scene::{Scene, View, World};
+use crate::scene::{Revisions, Scene, View, World};
 use crate::schedule::{Allowance, Budget, LearnedRate, cost};
 use crate::simd::SimdLevel;
 use std::sync::Arc;
@@ -85,7 +85,7 @@ pub struct Engine {
 #[derive(Debug)]
 struct Renderer {
     method: Method,
-    scene_id: u64,
+    revisions: Revisions,
     world: World,
     backend: Box<dyn Backend>,
     /// The view that the image in the backend shows, if it shows any.
@@ -137,7 +137,7 @@ impl Engine {
             pool,
             renderer: Renderer {
                 method: options.method,
-                scene_id: scene.id(),
+                revisions: scene.revisions(),
                 base: BaseImage::new(&world),
                 world,
                 backend: Box::new(SoftwareBackend::new()),
@@ -196,7 +196,7 @@ impl Renderer {
         self.adopt(scene);
         let view = self
             .world
-            .view(&scene.camera, frame.width(), frame.height());
+            .view(scene.camera(), frame.width(), frame.height());
 
         let is_new = self.shown != Some(view);
         if is_new {
@@ -243,10 +243,15 @@ impl Renderer {
 
     /// Makes the world anew when the scene is another one or has changed.
     fn adopt(&mut self, scene: &Scene) {
-        if scene.id() != self.scene_id {
+        // The camera is not part of the world.
+        let known = Revisions {
+            camera: scene.revisions().camera,
+            ..self.revisions
+        };
+        if scene.revisions() != known {
             self.world = World::new(scene);
             self.base = BaseImage::new(&self.world);
-            self.scene_id = scene.id();
+            self.revisions = scene.revisions();
             self.shown = None;
         }
     }

@@ -219,7 +219,7 @@ impl<'a> Sweep<'a> {
         // The world does not depend on the method, but there may be no method.
         let gouraud = options.engine(scene, Method::Gouraud)?;
         let world = gouraud.world();
-        let view = world.view(&scene.camera, options.width, options.height);
+        let view = world.view(scene.camera(), options.width, options.height);
         Ok(Self {
             name: name.into(),
             scene,

@@ -5,7 +5,7 @@
 //!
 //! ```
 //! let scene = specula::scene::Scene::parse("(objects: [(shape: Teapot())])", "example.ron")?;
-//! assert_eq!(scene.objects.len(), 1);
+//! assert_eq!(scene.objects().len(), 1);
 //! # Ok::<(), specula::scene::SceneError>(())
 //! ```
 //!
@@ -30,11 +30,12 @@
 //!     ],
 //! )
 //! # "##;
-//! # assert_eq!(specula::scene::Scene::parse(text, "example.ron")?.lights.len(), 2);
+//! # assert_eq!(specula::scene::Scene::parse(text, "example.ron")?.lights().len(), 2);
 //! # Ok::<(), specula::scene::SceneError>(())
 //! ```
 
 mod defaults;
+mod edit;
 mod error;
 pub mod limits;
 mod read;
@@ -44,6 +45,7 @@ mod syntax;
 pub mod view;
 pub mod world;
 
+pub use edit::Revisions;
 pub use error::SceneError;
 pub use view::{Eye, View};
 pub use world::{ReflectionModel, ShadingLight, ShadingMaterial, World};
@@ -55,30 +57,26 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A linear RGB colour or coefficient; 1 is the display's white.
 pub type Rgb = [f64; 3];
 
-/// A scene in author space: validated when it comes from a file.
+/// A scene in author space: validated when it comes from a file, and free to change between frames.
 ///
-/// Whoever changes a field calls [`touch`](Self::touch) afterwards, so that engines notice. A scene put together by
-/// hand should keep to the [`limits`], every object's material index below the number of materials.
+/// Its parts are read by getters and changed by setters, each of which gives the part that changes a new
+/// [revision](Revisions), so that an engine redoes what depends on it and nothing else. A scene put together by hand
+/// should keep to the [`limits`]; beyond them nothing panics, but what is drawn is not specified.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// From where it is seen.
-    pub camera: Camera,
-    /// Colour of pixels that nothing covers.
-    pub background: Rgb,
-    /// Ambient light.
-    pub ambient: Rgb,
-    /// Light sources.
-    pub lights: Vec<Light>,
-    /// Materials that objects refer to by index.
-    pub materials: Vec<Material>,
-    /// Meshes in place.
-    pub objects: Vec<Object>,
-    id: u64,
+    camera: Camera,
+    background: Rgb,
+    ambient: Rgb,
+    lights: Vec<Light>,
+    materials: Vec<Material>,
+    objects: Vec<Object>,
+    /// Where each object was when it came into the scene.
+    rest: Vec<DMat4>,
+    revisions: Revisions,
 }
 
 impl Scene {
@@ -125,21 +123,10 @@ impl Scene {
             ambient: defaults::AMBIENT,
             lights: defaults::lights(&extent),
             materials,
+            rest: places(&objects),
             objects,
-            id: fresh_id(),
+            revisions: Revisions::fresh(),
         }
-    }
-
-    /// Identity of this state of the scene: two scenes with the same id have the same contents, provided that
-    /// [`touch`](Self::touch) was called after every change. A clone keeps the id until it is touched.
-    #[must_use]
-    pub fn id(&self) -> u64 {
-        self.id
-    }
-
-    /// Tells that the scene has changed: gives it a new [`id`](Self::id).
-    pub fn touch(&mut self) {
-        self.id = fresh_id();
     }
 
     /// Number of triangles of all objects.
@@ -149,10 +136,9 @@ impl Scene {
     }
 }
 
-/// An id that no scene of this process has had.
-fn fresh_id() -> u64 {
-    static NEXT: AtomicU64 = AtomicU64::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed)
+/// Where the objects are.
+fn places(objects: &[Object]) -> Vec<DMat4> {
+    objects.iter().map(|o| o.author_from_mesh).collect()
 }
 
 /// The file's contents, cut off one byte beyond the limit.

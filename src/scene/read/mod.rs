@@ -5,7 +5,8 @@ use super::limits::{MAX_COLOR, MAX_LIGHTS, MAX_MATERIALS, MAX_SHININESS};
 use super::source::{Raw, Source};
 use super::syntax::{LightEntry, MaterialEntry, ModelEntry, Named, SceneEntry};
 use super::{
-    Camera, Extent, Light, LightKind, Material, ReflectionModel, Rgb, Scene, defaults, fresh_id,
+    Camera, Extent, Light, LightKind, Material, ReflectionModel, Revisions, Rgb, Scene, defaults,
+    places,
 };
 use std::collections::HashMap;
 use std::fmt::Display;
@@ -38,8 +39,9 @@ pub(super) fn scene(source: &Source<'_>) -> Result<Scene, SceneError> {
             None => defaults::lights(&extent),
         },
         materials: materials.list,
+        rest: places(&objects),
         objects,
-        id: fresh_id(),
+        revisions: Revisions::fresh(),
     })
 }
 
