@@ -201,7 +201,7 @@ impl Bench {
         let ns = self.median_ns(|| {
             // Touching the frame makes all of it unknown.
             frame.pixels_mut();
-            backend.present(self.exec, &mut frame);
+            frame.write(|target| backend.present(self.exec, target));
         });
         ns / f64::from(SIZE.0 * SIZE.1)
     }

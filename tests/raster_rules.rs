@@ -356,7 +356,7 @@ fn impossible_coordinates_draw_nothing_and_do_not_panic() {
         let all = 0..2;
         let geometry = geometry(&world, &view, std::slice::from_ref(&all));
         backend.resolve(best(), geometry, BasePaint::Phong);
-        backend.present(best(), &mut Frame::new(60, 40));
+        Frame::new(60, 40).write(|target| backend.present(best(), target));
     }
     let nothing = flat(0, 0);
     let counts = rasterize(
@@ -438,7 +438,10 @@ fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
         ] {
             backend.resolve(exec, geometry, paint);
             let mut frame = Frame::new(150, 100);
-            assert_eq!(backend.present(exec, &mut frame), 150 * 100);
+            assert_eq!(
+                frame.write(|target| backend.present(exec, target)),
+                150 * 100
+            );
             let mut far_off = 0;
             for (i, (&id, got)) in ids.iter().zip(frame.pixels()).enumerate() {
                 let mut at_horizon = false;
@@ -505,7 +508,7 @@ fn colours_do_not_depend_on_threads() {
             let mut frame = Frame::new(333, 222);
             backend.rasterize(exec, geometry);
             backend.resolve(exec, geometry, paint);
-            backend.present(exec, &mut frame);
+            frame.write(|target| backend.present(exec, target));
             frame
         };
         assert_eq!(draw(best()).as_bytes(), with_two_threads(draw).as_bytes());
@@ -535,23 +538,31 @@ fn frames_receive_exactly_the_tiles_that_changed() {
     let mut backend = SoftwareBackend::new();
     let (mut a, mut b) = (Frame::new(256, 128), Frame::new(256, 128));
     paint(&mut backend, 0.25);
-    assert_eq!(backend.present(exec, &mut a), 256 * 128);
-    assert_eq!(backend.present(exec, &mut a), 0, "nothing changed");
+    assert_eq!(a.write(|target| backend.present(exec, target)), 256 * 128);
+    assert_eq!(
+        a.write(|target| backend.present(exec, target)),
+        0,
+        "nothing changed"
+    );
     paint(&mut backend, 0.25);
-    assert_eq!(backend.present(exec, &mut a), 0, "the same image again");
+    assert_eq!(
+        a.write(|target| backend.present(exec, target)),
+        0,
+        "the same image again"
+    );
     paint(&mut backend, 0.5);
-    assert_eq!(backend.present(exec, &mut a), 64 * 64);
-    assert_eq!(backend.present(exec, &mut b), 256 * 128);
+    assert_eq!(a.write(|target| backend.present(exec, target)), 64 * 64);
+    assert_eq!(b.write(|target| backend.present(exec, target)), 256 * 128);
     assert_eq!(a.as_bytes(), b.as_bytes());
     a.pixels_mut()[0] = [1, 2, 3, 4];
     assert_eq!(
-        backend.present(exec, &mut a),
+        a.write(|target| backend.present(exec, target)),
         256 * 128,
         "somebody wrote into it"
     );
     assert_eq!(a.as_bytes(), b.as_bytes());
     assert_eq!(
-        SoftwareBackend::new().present(exec, &mut a),
+        a.write(|target| SoftwareBackend::new().present(exec, target)),
         0,
         "no image of this size"
     );
@@ -559,7 +570,7 @@ fn frames_receive_exactly_the_tiles_that_changed() {
     let mut other = SoftwareBackend::new();
     paint(&mut other, 0.75);
     assert_eq!(
-        other.present(exec, &mut b),
+        b.write(|target| other.present(exec, target)),
         256 * 128,
         "another writer's frame"
     );

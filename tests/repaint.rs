@@ -62,7 +62,7 @@ fn colours_at(patch: [Bary; 3], root: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
 
 fn image(backend: &mut SoftwareBackend, exec: Exec, view: &View) -> Vec<[u8; 4]> {
     let mut frame = Frame::new(view.width, view.height);
-    backend.present(exec, &mut frame);
+    frame.write(|target| backend.present(exec, target));
     frame.pixels().to_vec()
 }
 
@@ -392,7 +392,7 @@ fn pixels_of_other_triangles_and_tiles_that_stay_the_same_are_left_alone() {
     let mut backend = SoftwareBackend::new();
     draw_black(&mut backend, exec, geometry);
     let mut frame = Frame::new(200, 150);
-    backend.present(exec, &mut frame);
+    frame.write(|target| backend.present(exec, target));
     let chosen = backend.visible_triangles()[backend.visible_triangles().len() / 2];
     let hidden = (0..80)
         .find(|&id| backend.visible_pixels(id) == 0)
@@ -409,7 +409,7 @@ fn pixels_of_other_triangles_and_tiles_that_stay_the_same_are_left_alone() {
     backend.repaint(exec, geometry, &mut patches);
     assert!(patches[1..].iter().all(|patch| patch.pixels == 0));
     let before = frame.clone();
-    let written = backend.present(exec, &mut frame);
+    let written = frame.write(|target| backend.present(exec, target));
     let ids = Visibility::of(&backend).ids;
     let mut changed = 0;
     for ((&id, old), new) in ids.iter().zip(before.pixels()).zip(frame.pixels()) {
@@ -422,7 +422,7 @@ fn pixels_of_other_triangles_and_tiles_that_stay_the_same_are_left_alone() {
     assert!(written >= u64::from(changed) && written < 200 * 150);
     // The same paint again changes nothing.
     backend.repaint(exec, geometry, &mut patches);
-    assert_eq!(backend.present(exec, &mut frame), 0);
+    assert_eq!(frame.write(|target| backend.present(exec, target)), 0);
 }
 
 #[test]

@@ -9,7 +9,7 @@ pub mod software;
 
 use crate::geometry::{Bary, Vec3s};
 use crate::illumination::ActiveLights;
-use crate::output::Frame;
+use crate::output::Target;
 use crate::parallel::Exec;
 use crate::scene::{View, World};
 use std::fmt::Debug;
@@ -116,10 +116,10 @@ pub trait Backend: Debug + Send {
     /// of one call must not overlap. A pixel on the border of two adjacent patches belongs to exactly one.
     fn repaint(&mut self, exec: Exec, geometry: Geometry<'_>, patches: &mut [Patch]);
 
-    /// How many pixels [`present`](Self::present) would have to write to `frame` now.
-    fn pending_pixels(&self, frame: &Frame) -> u64;
+    /// How many pixels [`present`](Self::present) would have to write to `target` now.
+    fn pending_pixels(&self, target: &Target<'_>) -> u64;
 
-    /// Brings `frame` up to the current image; pixels known to be right already are not touched. The frame has the
-    /// view's size. Returns the number of pixels written.
-    fn present(&mut self, exec: Exec, frame: &mut Frame) -> u64;
+    /// Brings `target` up to the current image and marks it with its stamp; pixels known to be right already are not
+    /// touched. Returns the number of pixels written: none if the target has another size than the image.
+    fn present(&mut self, exec: Exec, target: &mut Target<'_>) -> u64;
 }

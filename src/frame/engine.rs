@@ -7,11 +7,13 @@ use super::stats::{FrameStats, Outcome, StageTimes};
 use crate::backend::Backend;
 use crate::backend::software::SoftwareBackend;
 use crate::clock::{Clock, SystemClock};
-use crate::output::Frame;
+use crate::output::frame::Stamp;
+use crate::output::{Frame, Target};
 use crate::parallel::Exec;
 use crate::scene::{Revisions, Scene, View, World};
 use crate::schedule::{Allowance, Budget, LearnedRate, cost};
 use crate::simd::SimdLevel;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// How an engine runs.
@@ -22,6 +24,9 @@ pub struct EngineOptions {
     /// Threads to use; `None` for as many as the machine has processors. With one, everything happens on the caller's
     /// thread; with more, the engine owns a pool.
     pub threads: Option<usize>,
+    /// A pool of the caller's to run in, with all its threads, in place of an own one; `threads` has no meaning then. A
+    /// frame rendered from inside the pool hands nothing over between threads to get there.
+    pub pool: Option<Arc<rayon::ThreadPool>>,
     /// SIMD level to use; `None` for the machine's strongest.
     pub simd: Option<SimdLevel>,
     /// Where time comes from.
@@ -33,6 +38,7 @@ impl Default for EngineOptions {
         Self {
             method: Method::default(),
             threads: None,
+            pool: None,
             simd: None,
             clock: Arc::new(SystemClock::new()),
         }
@@ -77,7 +83,7 @@ pub enum EngineError {
 pub struct Engine {
     clock: Arc<dyn Clock>,
     exec: Exec,
-    pool: Option<rayon::ThreadPool>,
+    pool: Option<Arc<rayon::ThreadPool>>,
     renderer: Renderer,
 }
 
@@ -95,7 +101,12 @@ struct Renderer {
     /// Time per pixel handed over to the caller.
     presenting: LearnedRate,
     frames: u64,
+    /// Which images the last frames handed over, the latest first.
+    handed_over: VecDeque<Option<Stamp>>,
 }
+
+/// Buffers older than this many frames are written anew: nobody queues more.
+const MOST_AGE: usize = 16;
 
 /// A frame of fewer pixels handed over does not tell how long one takes.
 const LEAST_PIXELS_TO_LEARN_FROM: u64 = 1 << 15;
@@ -116,20 +127,11 @@ impl Engine {
     pub fn with_options(scene: &Scene, options: EngineOptions) -> Result<Self, EngineError> {
         let simd = options.simd.unwrap_or_else(SimdLevel::detect);
         let level = simd.token().ok_or(EngineError::NoSuchSimdLevel(simd))?;
-        let threads = options.threads.unwrap_or_else(|| {
-            std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
-        });
-        let pool = match threads {
-            0 => return Err(EngineError::NoThreads),
-            1 => None,
-            _ => Some(
-                rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .thread_name(|index| format!("specula-{index}"))
-                    .build()
-                    .map_err(|source| EngineError::ThreadPool { threads, source })?,
-            ),
+        let pool = match options.pool {
+            Some(pool) => Some(pool),
+            None => own_pool(options.threads)?,
         };
+        let threads = pool.as_ref().map_or(1, |pool| pool.current_num_threads());
         let world = World::new(scene);
         Ok(Self {
             clock: options.clock,
@@ -145,6 +147,7 @@ impl Engine {
                 refinement: Refinement::default(),
                 presenting: LearnedRate::new(cost::PRESENT_PIXEL_NS, LEAST_PIXELS_TO_LEARN_FROM),
                 frames: 0,
+                handed_over: VecDeque::with_capacity(MOST_AGE),
             },
         })
     }
@@ -156,11 +159,33 @@ impl Engine {
     ///
     /// It never fails: a scene is validated when it is made.
     pub fn render(&mut self, scene: &Scene, budget: Budget, frame: &mut Frame) -> FrameStats {
+        frame.write(|target| self.render_target(scene, budget, target))
+    }
+
+    /// As [`render`](Self::render), into memory of the caller; see [`Target`].
+    pub fn render_into(
+        &mut self,
+        scene: &Scene,
+        budget: Budget,
+        mut target: Target<'_>,
+    ) -> FrameStats {
+        let age = (target.age() as usize).checked_sub(1);
+        let stamp = age.and_then(|age| *self.renderer.handed_over.get(age)?);
+        target.mark(stamp);
+        self.render_target(scene, budget, &mut target)
+    }
+
+    fn render_target(
+        &mut self,
+        scene: &Scene,
+        budget: Budget,
+        target: &mut Target<'_>,
+    ) -> FrameStats {
         let allowance = Allowance::new(budget, &*self.clock, self.clock.now_ms());
         let (renderer, exec) = (&mut self.renderer, self.exec);
         match &self.pool {
-            Some(pool) => pool.install(|| renderer.render(exec, scene, budget, allowance, frame)),
-            None => renderer.render(exec, scene, budget, allowance, frame),
+            Some(pool) => pool.install(|| renderer.render(exec, scene, budget, allowance, target)),
+            None => renderer.render(exec, scene, budget, allowance, target),
         }
     }
 
@@ -182,6 +207,22 @@ impl Engine {
     }
 }
 
+/// A pool of so many threads, or of as many as the machine has processors; none if that is one.
+fn own_pool(threads: Option<usize>) -> Result<Option<Arc<rayon::ThreadPool>>, EngineError> {
+    let threads = threads
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
+    match threads {
+        0 => Err(EngineError::NoThreads),
+        1 => Ok(None),
+        _ => rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|index| format!("specula-{index}"))
+            .build()
+            .map(|pool| Some(Arc::new(pool)))
+            .map_err(|source| EngineError::ThreadPool { threads, source }),
+    }
+}
+
 impl Renderer {
     /// One frame: draw the first image if there is none, refine it while the budget lasts, hand it over.
     fn render(
@@ -190,13 +231,13 @@ impl Renderer {
         scene: &Scene,
         budget: Budget,
         mut allowance: Allowance<'_>,
-        frame: &mut Frame,
+        target: &mut Target<'_>,
     ) -> FrameStats {
         let mut stages = StageTimes::default();
         self.adopt(scene);
         let view = self
             .world
-            .view(scene.camera(), frame.width(), frame.height());
+            .view(scene.camera(), target.width(), target.height());
 
         let is_new = self.shown != Some(view);
         if is_new {
@@ -205,12 +246,14 @@ impl Renderer {
 
         let refining_since = allowance.elapsed_ms();
         if self.method.is_progressive() {
-            self.refine(exec, &view, &mut allowance, frame);
+            self.refine(exec, &view, &mut allowance, target);
         }
         let presenting_since = allowance.elapsed_ms();
         stages.refine += presenting_since - refining_since;
 
-        let pixels_written = self.backend.present(exec, frame);
+        let pixels_written = self.backend.present(exec, target);
+        self.handed_over.truncate(MOST_AGE - 1);
+        self.handed_over.push_front(target.stamp());
         let frame_ms = allowance.elapsed_ms();
         stages.resolve += frame_ms - presenting_since;
         self.presenting
@@ -236,7 +279,7 @@ impl Renderer {
         self.base.report(&mut stats);
         self.refinement.report(self.method, &mut stats);
         stats.skipped.pixels_unchanged =
-            u64::from(frame.width()) * u64::from(frame.height()) - pixels_written;
+            u64::from(target.width()) * u64::from(target.height()) - pixels_written;
         self.frames += 1;
         stats
     }
@@ -309,7 +352,13 @@ impl Renderer {
     }
 
     /// Spends what is left of the budget, less what handing the image over will take.
-    fn refine(&mut self, exec: Exec, view: &View, allowance: &mut Allowance<'_>, frame: &Frame) {
+    fn refine(
+        &mut self,
+        exec: Exec,
+        view: &View,
+        allowance: &mut Allowance<'_>,
+        target: &Target<'_>,
+    ) {
         let mut stage = super::refinement::Stage {
             exec,
             world: &self.world,
@@ -318,7 +367,7 @@ impl Renderer {
             backend: &mut *self.backend,
         };
         loop {
-            let pending = stage.backend.pending_pixels(frame);
+            let pending = stage.backend.pending_pixels(target);
             allowance.reserve_ms(self.presenting.predict_ms(pending));
             if !self.refinement.step(&mut stage, allowance) {
                 break;

@@ -69,6 +69,7 @@ impl SweepOptions {
                 threads: self.threads,
                 simd: self.simd,
                 clock: Arc::clone(&self.clock),
+                ..EngineOptions::default()
             },
         )
     }

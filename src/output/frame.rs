@@ -1,5 +1,7 @@
 //! The image an engine renders into.
 
+use super::target::{PIXEL_BYTES, Target};
+
 /// An 8-bit RGBA image, rows from the top, sRGB encoded, opaque.
 #[derive(Clone, Debug)]
 pub struct Frame {
@@ -66,9 +68,16 @@ impl Frame {
         self.stamp
     }
 
-    /// The pixels for a writer that leaves the frame marked with `stamp`.
-    pub fn pixels_stamped(&mut self, stamp: Stamp) -> &mut [[u8; 4]] {
-        self.stamp = Some(stamp);
-        &mut self.pixels
+    /// Lets `write` bring the frame up to date. What it [marks](Target::mark) the target with is what the frame holds
+    /// from then on.
+    pub fn write<T>(&mut self, write: impl FnOnce(&mut Target<'_>) -> T) -> T {
+        let stride = self.width as usize * PIXEL_BYTES;
+        let bytes = self.pixels.as_flattened_mut();
+        let mut target = Target::with_stride(bytes, self.width, self.height, stride)
+            .expect("a frame has as many bytes as its size says")
+            .with_stamp(self.stamp);
+        let result = write(&mut target);
+        self.stamp = target.stamp();
+        result
     }
 }

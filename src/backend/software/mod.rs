@@ -31,7 +31,7 @@ mod visible;
 pub use tile::NO_TRIANGLE;
 
 use super::{Backend, BasePaint, Capabilities, Geometry, Patch, RasterCounts};
-use crate::output::Frame;
+use crate::output::Target;
 use crate::output::frame::Stamp;
 use crate::parallel::Exec;
 use crate::simd::dispatch;
@@ -217,18 +217,18 @@ impl Backend for SoftwareBackend {
         }
     }
 
-    fn pending_pixels(&self, frame: &Frame) -> u64 {
-        let known = present::known_serial(self.writer, frame);
+    fn pending_pixels(&self, target: &Target<'_>) -> u64 {
+        let known = present::known_serial(self.writer, target);
         present::stale_tiles(&self.tiles, known)
             .map(Tile::pixels)
             .sum()
     }
 
-    fn present(&mut self, exec: Exec, frame: &mut Frame) -> u64 {
+    fn present(&mut self, exec: Exec, target: &mut Target<'_>) -> u64 {
         let now = Stamp {
             writer: self.writer,
             serial: self.serial,
         };
-        present::present(exec, self.grid, &self.tiles, now, frame)
+        present::present(exec, self.grid, &self.tiles, now, target)
     }
 }

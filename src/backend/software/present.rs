@@ -1,61 +1,83 @@
-//! Copies of the image into frames.
+//! Copies of the image into targets.
 //!
-//! A frame says which writer filled it and when. Every tile knows when it changed last; so a frame of ours lacks
-//! exactly the tiles that changed after its stamp, and any other frame lacks all.
+//! A target says which writer filled it and when. Every tile knows when it changed last; so a target of ours lacks
+//! exactly the tiles that changed after its stamp, and any other target lacks all.
 
 use super::tile::{Grid, TILE_SIDE, Tile};
-use crate::output::Frame;
 use crate::output::frame::Stamp;
+use crate::output::target::PIXEL_BYTES;
+use crate::output::{ChannelOrder, Target};
 use crate::parallel::Exec;
 
-/// Brings `frame` from its own state to that of `now`. Returns the number of pixels written.
+/// Brings `target` from its own state to that of `now`. Returns the number of pixels written.
 pub(super) fn present(
     exec: Exec,
     grid: Grid,
     tiles: &[Tile],
     now: Stamp,
-    frame: &mut Frame,
+    target: &mut Target<'_>,
 ) -> u64 {
-    if (frame.width(), frame.height()) != (grid.width, grid.height) {
+    if (target.width(), target.height()) != (grid.width, grid.height) {
         return 0;
     }
-    let known = known_serial(now.writer, frame);
+    let known = known_serial(now.writer, target);
     let written = stale_tiles(tiles, known).map(Tile::pixels).sum();
-    let pixels = frame.pixels_stamped(now);
+    target.mark(Some(now));
     if written > 0 {
-        let width = grid.width as usize;
-        exec.for_each_chunk(pixels, width * TILE_SIDE, |row, band| {
-            let first = row * grid.columns;
-            for tile in stale_tiles(&tiles[first..first + grid.columns], known) {
-                copy_tile(tile, width, band);
-            }
-        });
+        let (stride, order) = (target.stride(), target.order());
+        exec.for_each_chunk(
+            target.bytes_mut(),
+            stride.saturating_mul(TILE_SIDE),
+            |row, band| {
+                let first = row * grid.columns;
+                // Behind the last row there may be more bytes.
+                let Some(row_of_tiles) = tiles.get(first..first + grid.columns) else {
+                    return;
+                };
+                for tile in stale_tiles(row_of_tiles, known) {
+                    match order {
+                        ChannelOrder::Rgba => copy_tile(tile, stride, band, u32::to_le_bytes),
+                        ChannelOrder::Bgra => copy_tile(tile, stride, band, bgra),
+                    }
+                }
+            },
+        );
     }
     written
 }
 
-/// The serial of the image that `frame` holds, if `writer` filled it last.
-pub(super) fn known_serial(writer: u64, frame: &Frame) -> Option<u64> {
-    let stamp = frame.stamp().filter(|stamp| stamp.writer == writer)?;
+/// The serial of the image that `target` holds, if `writer` filled it last.
+pub(super) fn known_serial(writer: u64, target: &Target<'_>) -> Option<u64> {
+    let stamp = target.stamp().filter(|stamp| stamp.writer == writer)?;
     Some(stamp.serial)
 }
 
-/// The tiles that a frame lacks which holds the image of serial `known`, or an unknown one.
+/// The tiles that a target lacks which holds the image of serial `known`, or an unknown one.
 pub(super) fn stale_tiles(tiles: &[Tile], known: Option<u64>) -> impl Iterator<Item = &Tile> {
     tiles
         .iter()
         .filter(move |tile| known.is_none_or(|serial| tile.serial > serial))
 }
 
-/// Copies a tile into the rows of the frame that it takes part in.
-fn copy_tile(tile: &Tile, frame_width: usize, band: &mut [[u8; 4]]) {
-    let (left, width) = (tile.origin[0] as usize, tile.width as usize);
+/// Copies a tile into the rows of the target that it takes part in.
+#[inline(always)]
+fn copy_tile(tile: &Tile, stride: usize, band: &mut [u8], bytes_of: impl Fn(u32) -> [u8; 4]) {
+    let left = tile.origin[0] as usize * PIXEL_BYTES;
+    let width = tile.width as usize * PIXEL_BYTES;
     for (row, colours) in band
-        .chunks_mut(frame_width)
+        .chunks_mut(stride)
         .zip(tile.colour.chunks(TILE_SIDE))
+        .take(tile.height as usize)
     {
-        for (pixel, colour) in row[left..left + width].iter_mut().zip(colours) {
-            *pixel = colour.to_le_bytes();
+        let (pixels, _) = row[left..left + width].as_chunks_mut::<PIXEL_BYTES>();
+        for (pixel, &colour) in pixels.iter_mut().zip(colours) {
+            *pixel = bytes_of(colour);
         }
     }
+}
+
+/// The bytes of a colour that is stored as red, green, blue, 255.
+fn bgra(colour: u32) -> [u8; 4] {
+    let [r, g, b, a] = colour.to_le_bytes();
+    [b, g, r, a]
 }

@@ -1,0 +1,182 @@
+//! Rendering into memory, pools and threads of the caller.
+
+use specula::output::{ChannelOrder, Target};
+use specula::scene::Camera;
+use specula::{Budget, Engine, EngineOptions, Frame, Method, Scene};
+use std::sync::Arc;
+
+const WIDTH: u32 = 150;
+const HEIGHT: u32 = 100;
+
+fn scene() -> Scene {
+    Scene::parse(
+        "(
+            objects: [
+                (shape: Teapot(tessellation: 3)),
+                (shape: Plane(width: 4, depth: 4)),
+            ],
+        )",
+        "embedding.ron",
+    )
+    .expect("a valid scene")
+}
+
+fn options(threads: usize) -> EngineOptions {
+    EngineOptions {
+        threads: Some(threads),
+        ..EngineOptions::default()
+    }
+}
+
+fn engine(scene: &Scene, options: EngineOptions) -> Engine {
+    Engine::with_options(scene, options).expect("an engine")
+}
+
+/// A camera that is somewhere else in every frame.
+fn turned(camera: &Camera, frame: usize) -> Camera {
+    let mut camera = *camera;
+    camera.position.x += frame as f64 * 0.05;
+    camera
+}
+
+/// What the frame shows, as bytes in rows.
+fn expected(scene: &Scene, budget: Budget) -> Frame {
+    let mut frame = Frame::new(WIDTH, HEIGHT);
+    engine(scene, options(1)).render(scene, budget, &mut frame);
+    frame
+}
+
+#[test]
+fn a_callers_buffer_gets_the_same_pixels_and_its_gaps_are_left_alone() {
+    let scene = scene();
+    let frame = expected(&scene, Budget::Work(100_000));
+    let stride = WIDTH as usize * 4 + 37;
+    for threads in [1, 2] {
+        for order in [ChannelOrder::Rgba, ChannelOrder::Bgra] {
+            // The last row has no gap behind it, and the buffer begins and ends in guarded bytes.
+            let needed = stride * (HEIGHT as usize - 1) + WIDTH as usize * 4;
+            let mut bytes = vec![0xA5_u8; needed + 200];
+            let target = Target::with_stride(&mut bytes[100..], WIDTH, HEIGHT, stride)
+                .expect("there is room")
+                .with_order(order);
+            let stats =
+                engine(&scene, options(threads)).render_into(&scene, Budget::Work(100_000), target);
+            assert_eq!(stats.pixels_written, u64::from(WIDTH * HEIGHT));
+            let (before, rest) = bytes.split_at(100);
+            let (image, after) = rest.split_at(needed);
+            assert!(before.iter().chain(after).all(|&byte| byte == 0xA5));
+            for (row, pixels) in image
+                .chunks(stride)
+                .zip(frame.pixels().chunks(WIDTH as usize))
+            {
+                let (row, gap) = row.split_at(WIDTH as usize * 4);
+                assert!(gap.iter().all(|&byte| byte == 0xA5));
+                for (bytes, &[r, g, b, a]) in row.chunks(4).zip(pixels) {
+                    match order {
+                        ChannelOrder::Rgba => assert_eq!(bytes, [r, g, b, a]),
+                        ChannelOrder::Bgra => assert_eq!(bytes, [b, g, r, a]),
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_buffer_of_any_age_ends_up_with_the_current_image() {
+    let mut scene = scene();
+    let camera = *scene.camera();
+    // As a window system does it: a ring of buffers, each used again when it is so many frames old.
+    for ring in [1_usize, 2, 3, 15, 16, 17, 20] {
+        let mut tested = engine(&scene, options(1));
+        let mut twin = engine(&scene, options(1));
+        let mut buffers = vec![vec![0_u8; (WIDTH * HEIGHT * 4) as usize]; ring];
+        let mut written = 0;
+        for frame in 0..2 * ring + 5 {
+            // Still for three frames, moved, still again.
+            scene.set_camera(turned(&camera, frame / 4));
+            let age = if frame < ring { 0 } else { ring as u32 };
+            let buffer = &mut buffers[frame % ring];
+            let target = Target::new(buffer, WIDTH, HEIGHT)
+                .expect("there is room")
+                .with_age(age);
+            let stats = tested.render_into(&scene, Budget::Work(30_000), target);
+            written += stats.pixels_written;
+            let mut whole = Frame::new(WIDTH, HEIGHT);
+            twin.render(&scene, Budget::Work(30_000), &mut whole);
+            assert!(*buffer == whole.as_bytes(), "ring {ring}, frame {frame}");
+        }
+        let all = u64::from(WIDTH * HEIGHT) * (2 * ring as u64 + 5);
+        if ring <= 3 {
+            assert!(written < all, "ring {ring}: {written} of {all}");
+        }
+        if ring > 16 {
+            assert_eq!(written, all, "ring {ring}");
+        }
+    }
+}
+
+#[test]
+fn only_what_a_buffer_lacks_is_written() {
+    let mut scene = scene();
+    let camera = *scene.camera();
+    let mut engine = engine(&scene, options(1));
+    let mut bytes = vec![0_u8; (WIDTH * HEIGHT * 4) as usize];
+    let mut render = |scene: &Scene, bytes: &mut [u8], age: u32| {
+        let target = Target::new(bytes, WIDTH, HEIGHT)
+            .expect("there is room")
+            .with_age(age);
+        let stats = engine.render_into(scene, Budget::Unlimited, target);
+        stats.pixels_written
+    };
+    let all = u64::from(WIDTH * HEIGHT);
+    assert_eq!(render(&scene, &mut bytes, 0), all);
+    assert_eq!(render(&scene, &mut bytes, 1), 0, "a converged image");
+    assert_eq!(render(&scene, &mut bytes, 2), 0, "the same two frames ago");
+    assert_eq!(render(&scene, &mut bytes, 0), all, "nothing is known");
+    for _ in 0..20 {
+        assert_eq!(render(&scene, &mut bytes, 1), 0);
+    }
+    assert_eq!(render(&scene, &mut bytes, 16), 0);
+    assert_eq!(render(&scene, &mut bytes, 17), all, "older than remembered");
+    scene.set_camera(turned(&camera, 1));
+    assert!(render(&scene, &mut bytes, 1) > 0);
+    let converged = expected(&scene, Budget::Unlimited);
+    assert!(bytes == converged.as_bytes());
+}
+
+#[test]
+fn an_engine_may_move_between_threads_and_run_in_the_callers_pool() {
+    fn is_send<T: Send>(_: &T) {}
+    let scene = scene();
+    let wanted = expected(&scene, Budget::Work(200_000));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+    let pool = Arc::new(pool.expect("a pool"));
+    let mut engine = engine(
+        &scene,
+        EngineOptions {
+            pool: Some(Arc::clone(&pool)),
+            method: Method::Adaptive,
+            ..EngineOptions::default()
+        },
+    );
+    is_send(&engine);
+    assert_eq!(engine.threads(), 2);
+    let outside = {
+        let mut frame = Frame::new(WIDTH, HEIGHT);
+        engine.render(&scene, Budget::Work(200_000), &mut frame);
+        frame
+    };
+    assert!(outside.pixels() == wanted.pixels());
+    engine.forget();
+    // From another thread, and from inside the pool.
+    let inside = std::thread::scope(|scope| {
+        let render = || {
+            let mut frame = Frame::new(WIDTH, HEIGHT);
+            pool.install(|| engine.render(&scene, Budget::Work(200_000), &mut frame));
+            frame
+        };
+        scope.spawn(render).join().expect("no panic")
+    });
+    assert!(inside.pixels() == wanted.pixels());
+}
