@@ -2,7 +2,7 @@
 
 use super::Method;
 use super::base::BaseImage;
-use super::refinement::Refinement;
+use super::refinement::{Leaf, Refinement, for_each_leaf};
 use super::stats::{FrameStats, Outcome, StageTimes};
 use crate::backend::Backend;
 use crate::backend::software::SoftwareBackend;
@@ -192,6 +192,15 @@ impl Engine {
     /// Forgets the current image, so that the next frame starts cold. Memory stays allocated and threads stay awake.
     pub fn forget(&mut self) {
         self.renderer.shown = None;
+    }
+
+    /// Calls `f` with everything that the current image consists of: visible triangles, or the leaves and parts that
+    /// they were divided into. Nothing before the first frame, and after [`forget`](Self::forget).
+    pub fn for_each_leaf(&self, f: impl FnMut(&Leaf)) {
+        let r = &self.renderer;
+        if r.shown.is_some() {
+            for_each_leaf(r.method, &r.world, &r.base, &*r.backend, &r.refinement, f);
+        }
     }
 
     /// The scene as it is rendered.

@@ -11,4 +11,5 @@ mod stats;
 
 pub use engine::{Engine, EngineError, EngineOptions};
 pub use method::Method;
+pub use refinement::{Leaf, LeafKind};
 pub use stats::{FrameStats, Outcome, Skipped, StageTimes};

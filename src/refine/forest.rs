@@ -108,6 +108,13 @@ impl Forest {
         &self.leaves[id as usize]
     }
 
+    /// The leaves that have not been split, with their numbers, in the order in which they were made.
+    pub fn current_leaves(&self) -> impl Iterator<Item = (LeafId, &Leaf)> {
+        (0..)
+            .zip(&self.leaves)
+            .filter(|(_, leaf)| leaf.state != LeafState::Split)
+    }
+
     /// Whether the leaf takes part in a split that has been planned and not concluded, or has been planted and not been
     /// illuminated: it must be left alone until then.
     #[must_use]

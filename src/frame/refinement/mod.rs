@@ -13,6 +13,7 @@
 //! Plans depend on nominal costs and estimates only, and patches are painted in list order until the budget ends, so
 //! that a budget in work units gives the same image for any number of threads.
 
+mod leaves;
 mod painting;
 mod parts;
 mod planning;
@@ -28,6 +29,8 @@ use crate::refine::estimate::Samples;
 use crate::refine::{Forest, LeafId, SplitOutcome};
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, RankedQueue};
+pub(super) use leaves::for_each_leaf;
+pub use leaves::{Leaf, LeafKind};
 use parts::Part;
 use std::collections::VecDeque;
 
@@ -72,6 +75,8 @@ struct Root {
     is_refined: bool,
     /// How its pixels are shaded, once that has been asked.
     shading: Option<Shading>,
+    /// Number of the last patch that shades it as a whole; see [`Refinement::enqueued`].
+    last_paint: u32,
 }
 
 /// How far a root has come.
@@ -116,6 +121,10 @@ struct Paint {
 struct Progressing {
     patches: u32,
     pixels: u32,
+    /// Number of its last patch; see [`Refinement::enqueued`].
+    last_paint: u32,
+    /// Its parts have taken its place.
+    is_cut: bool,
 }
 
 /// All refinement of the current image.
@@ -127,6 +136,8 @@ pub(super) struct Refinement {
     /// Place of a triangle in `roots`, for visible ones.
     root_of_triangle: Vec<u32>,
     paints: VecDeque<Paint>,
+    /// How many patches were put on the list so far, which numbers them from 1.
+    enqueued: u32,
     parts: Vec<Part>,
     /// How many of `parts` have been ranked; the samples of the others are still to be evaluated.
     ranked_parts: usize,
@@ -164,6 +175,7 @@ impl Refinement {
         self.queue.clear();
         self.roots.clear();
         self.paints.clear();
+        self.enqueued = 0;
         self.progressing.clear();
         self.parts.clear();
         self.samples.clear();
@@ -209,6 +221,7 @@ impl Refinement {
                 is_split: false,
                 is_refined: false,
                 shading,
+                last_paint: 0,
             });
         }
         if !self.by_area {

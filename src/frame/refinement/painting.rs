@@ -92,8 +92,12 @@ impl Refinement {
             }
             return;
         }
+        self.enqueued += 1;
+        let number = self.enqueued;
         if let Owner::Leaf(leaf) = owner {
-            self.leaf_progress(leaf).patches += 1;
+            let progress = self.leaf_progress(leaf);
+            progress.patches += 1;
+            progress.last_paint = number;
         }
         self.paints.push_back(Paint {
             patch,

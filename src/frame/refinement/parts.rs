@@ -29,12 +29,27 @@ pub(super) fn is_large(pixels: f32) -> bool {
 /// A part of a leaf that is waiting to be shaded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
-    leaf: LeafId,
-    piece: Piece,
+    pub(super) leaf: LeafId,
+    pub(super) piece: Piece,
     /// Estimated.
     pub(super) pixels: f32,
     /// Estimated mean squared error.
     error: f32,
+    pub(super) state: PartState,
+}
+
+/// What has become of a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PartState {
+    /// It is a candidate.
+    Waiting,
+    /// Smaller parts have taken its place.
+    Cut,
+    /// It is on the list to be shaded, if it needs to be, or was shaded.
+    Shaded {
+        /// Number of its last patch; see [`Refinement::enqueued`].
+        last_paint: u32,
+    },
 }
 
 impl Part {
@@ -46,9 +61,9 @@ impl Part {
 
 /// A triangle inside a root with interpolated colours at its corners.
 #[derive(Clone, Copy, Debug)]
-struct Piece {
-    corners: [Bary; 3],
-    colours: [[f32; 3]; 3],
+pub(super) struct Piece {
+    pub(super) corners: [Bary; 3],
+    pub(super) colours: [[f32; 3]; 3],
 }
 
 impl Piece {
@@ -75,7 +90,9 @@ impl Refinement {
             colours: self.forest.colours(stage.base.colours(), id),
         };
         let parts = self.cut(stage, id, triangle, whole, pixels, CUT);
-        self.leaf_progress(id).patches = parts;
+        let progress = self.leaf_progress(id);
+        progress.patches = parts;
+        progress.is_cut = true;
     }
 
     /// Takes a part up: cuts it again, or has its pixels shaded.
@@ -86,8 +103,11 @@ impl Refinement {
         if is_large(part.pixels) && part.piece.quarters().is_some() {
             let parts = self.cut(stage, part.leaf, triangle, part.piece, part.pixels, CUT);
             self.leaf_progress(part.leaf).patches += parts;
+            self.parts[index as usize].state = PartState::Cut;
         } else {
             self.shade_part(stage, &part, triangle);
+            let last_paint = self.enqueued;
+            self.parts[index as usize].state = PartState::Shaded { last_paint };
         }
         let progress = self.leaf_progress(part.leaf);
         progress.patches -= 1;
@@ -120,6 +140,7 @@ impl Refinement {
             piece,
             pixels,
             error: 0.0,
+            state: PartState::Waiting,
         });
         let world = stage.world;
         let root = world.triangles[triangle as usize].map(|v| v as usize);

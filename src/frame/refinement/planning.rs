@@ -230,6 +230,7 @@ impl Refinement {
         self.roots[index as usize].progress = Progress::Done;
         self.error_mass -= f64::from(root.pixels) * f64::from(root.prior);
         self.shade_patch(stage, index, Bary::ROOT, root.pixels);
+        self.roots[index as usize].last_paint = self.enqueued;
     }
 
     /// Has the pixels of a leaf shaded.
@@ -240,6 +241,7 @@ impl Refinement {
         let (corners, pixels) = (leaf.corners, leaf.pixels);
         if let Some(index) = self.root_of(leaf.triangle) {
             self.shade_patch(stage, index, corners, pixels);
+            self.leaf_progress(id).last_paint = self.enqueued;
         }
     }
 

@@ -1,0 +1,165 @@
+//! `Engine::for_each_leaf` says what the image consists of: held against the image itself.
+
+use specula::frame::{Leaf, LeafKind};
+use specula::geometry::Bary;
+use specula::geometry::screen::{TrianglePlanes, normalized_weights};
+use specula::measure::ReferenceImage;
+use specula::output::encode::encode;
+use specula::scene::World;
+use specula::{Budget, Engine, EngineOptions, Frame, Method, Scene};
+use std::collections::HashMap;
+
+const SIZE: (u32, u32) = (240, 160);
+
+/// Small triangles, and large ones that are shaded part by part.
+const SCENE: &str = r"(
+    camera: Perspective(position: (3.0, -7.0, 4.0), target: (0.0, 0.0, 0.7), fov_degrees: 40.0),
+    lights: [Point(position: (4.0, -5.0, 6.0)), Point(position: (-4.0, 3.0, 5.0), intensity: 0.6)],
+    objects: [
+        (shape: Teapot(tessellation: 3)),
+        (shape: Plane(width: 12.0, depth: 12.0, columns: 2, rows: 2)),
+    ],
+)";
+
+fn engine(scene: &Scene, method: Method) -> Engine {
+    let options = EngineOptions {
+        method,
+        threads: Some(1),
+        ..EngineOptions::default()
+    };
+    Engine::with_options(scene, options).expect("the options are valid")
+}
+
+/// The leaves of each triangle.
+fn leaves(engine: &Engine) -> HashMap<u32, Vec<Leaf>> {
+    let mut all: HashMap<u32, Vec<Leaf>> = HashMap::new();
+    engine.for_each_leaf(|leaf| all.entry(leaf.triangle).or_default().push(*leaf));
+    all
+}
+
+/// Barycentric coordinates in the leaf, of a point of its triangle.
+fn inside(leaf: &Leaf, point: [f64; 3]) -> [f64; 3] {
+    let [a, b, c] = leaf
+        .corners
+        .map(|corner| corner.weights().map(f64::from))
+        .map(|[_, b1, b2]| glam::DVec2::new(b1, b2));
+    let p = glam::DVec2::new(point[1], point[2]);
+    let area = (b - a).perp_dot(c - a);
+    [
+        (b - p).perp_dot(c - p) / area,
+        (c - p).perp_dot(a - p) / area,
+        (a - p).perp_dot(b - p) / area,
+    ]
+}
+
+/// The view's reference, and for each covered pixel its owner and where in it the pixel is.
+fn pixels(scene: &Scene) -> (ReferenceImage, Vec<Option<(u32, [f64; 3])>>) {
+    let world = World::new(scene);
+    let view = world.view(&scene.camera, SIZE.0, SIZE.1);
+    let reference = ReferenceImage::render(&world, &view, 2);
+    let points = reference.ids.iter().zip(0i32..).map(|(&id, index)| {
+        let triangle = world.triangles.get(id as usize)?;
+        let corners = triangle.map(|v| view.project(world.positions.get(v as usize)));
+        let (x, y) = (index % SIZE.0 as i32, index / SIZE.0 as i32);
+        let edges = TrianglePlanes::new(corners).edges_at_pixel(x, y);
+        Some((id, normalized_weights(edges.map(|e| e.max(0.0)))))
+    });
+    let points = points.collect();
+    (reference, points)
+}
+
+#[test]
+fn leaves_divide_every_visible_triangle_and_colour_its_pixels_as_they_say() {
+    let scene = Scene::parse(SCENE, "leaves.ron").expect("the scene is valid");
+    let (reference, points) = pixels(&scene);
+    let mut engine = engine(&scene, Method::Adaptive);
+    let mut frame = Frame::new(SIZE.0, SIZE.1);
+    engine.for_each_leaf(|leaf| panic!("there is no image yet, but {leaf:?}"));
+
+    let mut seen: HashMap<&str, u32> = HashMap::new();
+    for units in [0, 30_000, 20_000, 100_000, 50_000, 500_000] {
+        engine.render(&scene, Budget::Work(units), &mut frame);
+        let all = leaves(&engine);
+        for (&triangle, leaves) in &all {
+            let area: i32 = leaves
+                .iter()
+                .map(|leaf| Bary::doubled_area(leaf.corners))
+                .sum();
+            assert_eq!(area, 1 << 30, "{triangle}: {leaves:?}");
+        }
+        let mut checked = 0;
+        for (index, point) in points.iter().enumerate() {
+            let Some((triangle, point)) = *point else {
+                continue;
+            };
+            // Next to a border it may belong to either side.
+            let holders = all[&triangle].iter().filter_map(|leaf| {
+                let weights = inside(leaf, point);
+                weights.iter().all(|&w| w > 2e-3).then_some((leaf, weights))
+            });
+            let holders: Vec<_> = holders.collect();
+            assert!(holders.len() <= 1, "leaves overlap: {holders:?}");
+            let Some(&(leaf, weights)) = holders.first() else {
+                continue;
+            };
+            let [r, g, b, _] = frame.pixels()[index].map(f64::from);
+            let expected = match (leaf.is_painted, leaf.kind) {
+                (false, _) => {
+                    *seen.entry("waiting").or_default() += 1;
+                    continue;
+                }
+                (true, LeafKind::PerPixel) => {
+                    *seen.entry("per pixel").or_default() += 1;
+                    reference.codes[index]
+                }
+                (true, LeafKind::Interpolated | LeafKind::Proved) => {
+                    let name = if leaf.level > 0 { "finer" } else { "whole" };
+                    *seen.entry(name).or_default() += 1;
+                    let colours = leaf.colours.map(|c| c.map(f64::from));
+                    std::array::from_fn(|k| {
+                        let linear: f64 = (0..3).map(|i| weights[i] * colours[i][k]).sum();
+                        encode(linear.clamp(0.0, 1.0))
+                    })
+                }
+            };
+            let off = (0..3).map(|k| (expected[k] - [r, g, b][k]).abs());
+            let off = off.fold(0.0, f64::max);
+            assert!(off < 2.0, "pixel {index} is off by {off} codes: {leaf:?}");
+            checked += 1;
+        }
+        assert!(checked > 5000, "{checked} pixels checked");
+    }
+    for name in ["waiting", "per pixel", "finer", "whole"] {
+        assert!(seen.get(name).is_some_and(|&n| n > 100), "{name}: {seen:?}");
+    }
+}
+
+#[test]
+fn pixels_add_up_and_a_converged_image_has_none_left_to_refine() {
+    let scene = Scene::parse(SCENE, "leaves.ron").expect("the scene is valid");
+    let mut frame = Frame::new(SIZE.0, SIZE.1);
+    for method in Method::ALL {
+        let mut engine = engine(&scene, method);
+        let stats = engine.render(&scene, Budget::Unlimited, &mut frame);
+        let all = leaves(&engine);
+        assert_eq!(all.len() as u64, stats.triangles_visible, "{method}");
+        let leaves = || all.values().flatten();
+        let total: u64 = leaves().map(|leaf| u64::from(leaf.pixels)).sum();
+        if method == Method::Adaptive {
+            // Pixels of parts are estimated.
+            let off = total.abs_diff(stats.covered_pixels);
+            assert!(off < stats.covered_pixels / 20, "{total} {stats:?}");
+            let phts = all.values().filter(|leaves| leaves[0].is_pht).count();
+            assert_eq!(phts as u64, stats.pht_visible);
+        } else {
+            assert_eq!(total, stats.covered_pixels, "{method}");
+        }
+        assert!(leaves().all(|leaf| leaf.is_painted), "{method}");
+        let open = leaves().any(|leaf| leaf.kind == LeafKind::Interpolated && leaf.pixels > 0);
+        assert_eq!(
+            open,
+            matches!(method, Method::Flat | Method::Gouraud),
+            "{method}"
+        );
+    }
+}
