@@ -52,8 +52,11 @@ fn inside(leaf: &Leaf, point: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// The view's reference, and for each covered pixel its owner and where in it the pixel is.
-fn pixels(scene: &Scene) -> (ReferenceImage, Vec<Option<(u32, [f64; 3])>>) {
+/// A pixel's owner, and where in it the pixel is.
+type Place = (u32, [f64; 3]);
+
+/// The view's reference, and the places of the covered pixels.
+fn pixels(scene: &Scene) -> (ReferenceImage, Vec<Option<Place>>) {
     let world = World::new(scene);
     let view = world.view(&scene.camera, SIZE.0, SIZE.1);
     let reference = ReferenceImage::render(&world, &view, 2);
