@@ -58,7 +58,7 @@ type Place = (u32, [f64; 3]);
 /// The view's reference, and the places of the covered pixels.
 fn pixels(scene: &Scene) -> (ReferenceImage, Vec<Option<Place>>) {
     let world = World::new(scene);
-    let view = world.view(&scene.camera, SIZE.0, SIZE.1);
+    let view = world.view(scene.camera(), SIZE.0, SIZE.1);
     let reference = ReferenceImage::render(&world, &view, 2);
     let points = reference.ids.iter().zip(0i32..).map(|(&id, index)| {
         let triangle = world.triangles.get(id as usize)?;
