@@ -533,7 +533,7 @@ fn each_setter_gives_its_part_a_new_revision_and_no_other() {
         ),
         (
             |scene| scene.set_object_material(0, 1),
-            |old, new| old.objects = new.objects,
+            |old, new| old.materials = new.materials,
         ),
     ];
     for (index, (change, allowed)) in changes.into_iter().enumerate() {

@@ -62,6 +62,11 @@ impl BaseImage {
         }
     }
 
+    /// Takes over where the clusters are after some of them have moved.
+    pub(super) fn refit(&mut self, world: &World) {
+        self.culler.refit(&world.clusters);
+    }
+
     /// What there is to draw of the view last culled.
     pub(super) fn geometry<'a>(&'a self, world: &'a World, view: &'a View) -> Geometry<'a> {
         Geometry {

@@ -10,7 +10,7 @@ use crate::clock::{Clock, SystemClock};
 use crate::output::frame::Stamp;
 use crate::output::{Frame, Target};
 use crate::parallel::Exec;
-use crate::scene::{Revisions, Scene, View, World};
+use crate::scene::{GeometryChange, Placement, Scene, View, World};
 use crate::schedule::{Allowance, Budget, LearnedRate, cost};
 use crate::simd::SimdLevel;
 use std::collections::VecDeque;
@@ -91,11 +91,13 @@ pub struct Engine {
 #[derive(Debug)]
 struct Renderer {
     method: Method,
-    revisions: Revisions,
+    placement: Placement,
     world: World,
     backend: Box<dyn Backend>,
-    /// The view that the image in the backend shows, if it shows any.
-    shown: Option<View>,
+    /// The view for which the backend knows who owns which pixel, if it does for any.
+    seen: Option<View>,
+    /// Whether the image of that view has its colours, as far as it has been refined.
+    is_lit: bool,
     base: BaseImage,
     refinement: Refinement,
     /// Time per pixel handed over to the caller.
@@ -132,18 +134,19 @@ impl Engine {
             None => own_pool(options.threads)?,
         };
         let threads = pool.as_ref().map_or(1, |pool| pool.current_num_threads());
-        let world = World::new(scene);
+        let (placement, world) = Placement::new(scene);
         Ok(Self {
             clock: options.clock,
             exec: Exec { level, threads },
             pool,
             renderer: Renderer {
                 method: options.method,
-                revisions: scene.revisions(),
+                placement,
                 base: BaseImage::new(&world),
                 world,
                 backend: Box::new(SoftwareBackend::new()),
-                shown: None,
+                seen: None,
+                is_lit: false,
                 refinement: Refinement::default(),
                 presenting: LearnedRate::new(cost::PRESENT_PIXEL_NS, LEAST_PIXELS_TO_LEARN_FROM),
                 frames: 0,
@@ -155,7 +158,9 @@ impl Engine {
     /// Renders the scene from its camera into `frame`, within `budget`.
     ///
     /// A still view is refined further from frame to frame, until it equals per-pixel Phong shading; then nothing is
-    /// drawn any more. A changed scene, view or image size starts anew.
+    /// drawn any more. After a change, what depends on it is done again: with other lights or materials, the owners of
+    /// all pixels stay known; with another camera or image size, the scene stays prepared; objects that move are
+    /// placed anew, and others are not.
     ///
     /// It never fails: a scene is validated when it is made.
     pub fn render(&mut self, scene: &Scene, budget: Budget, frame: &mut Frame) -> FrameStats {
@@ -191,14 +196,14 @@ impl Engine {
 
     /// Forgets the current image, so that the next frame starts cold. Memory stays allocated and threads stay awake.
     pub fn forget(&mut self) {
-        self.renderer.shown = None;
+        self.renderer.seen = None;
     }
 
     /// Calls `f` with everything that the current image consists of: visible triangles, or the leaves and parts that
     /// they were divided into. Nothing before the first frame, and after [`forget`](Self::forget).
     pub fn for_each_leaf(&self, f: impl FnMut(&Leaf)) {
         let r = &self.renderer;
-        if r.shown.is_some() {
+        if r.seen.is_some() && r.is_lit {
             for_each_leaf(r.method, &r.world, &r.base, &*r.backend, &r.refinement, f);
         }
     }
@@ -248,9 +253,13 @@ impl Renderer {
             .world
             .view(scene.camera(), target.width(), target.height());
 
-        let is_new = self.shown != Some(view);
+        let is_seen = self.seen == Some(view);
+        if !is_seen {
+            self.look(exec, &view, &allowance, &mut stages);
+        }
+        let is_new = !self.is_lit;
         if is_new {
-            self.draw_base(exec, &view, &allowance, &mut stages);
+            self.light(exec, &view, &allowance, &mut stages);
         }
 
         let refining_since = allowance.elapsed_ms();
@@ -287,29 +296,57 @@ impl Renderer {
         };
         self.base.report(&mut stats);
         self.refinement.report(self.method, &mut stats);
+        if is_seen {
+            stats.skipped.visibility_pixels = stats.covered_pixels;
+        }
         stats.skipped.pixels_unchanged =
             u64::from(target.width()) * u64::from(target.height()) - pixels_written;
         self.frames += 1;
         stats
     }
 
-    /// Makes the world anew when the scene is another one or has changed.
+    /// Takes over what has changed of the scene.
     fn adopt(&mut self, scene: &Scene) {
-        // The camera is not part of the world.
-        let known = Revisions {
-            camera: scene.revisions().camera,
-            ..self.revisions
-        };
-        if scene.revisions() != known {
-            self.world = World::new(scene);
-            self.base = BaseImage::new(&self.world);
-            self.revisions = scene.revisions();
-            self.shown = None;
+        let changes = self.placement.update(&mut self.world, scene);
+        match changes.geometry {
+            GeometryChange::None => {}
+            GeometryChange::Moved => {
+                self.base.refit(&self.world);
+                self.seen = None;
+            }
+            GeometryChange::Replaced => {
+                self.base = BaseImage::new(&self.world);
+                self.seen = None;
+            }
+        }
+        if changes.shading || changes.background {
+            self.is_lit = false;
         }
     }
 
-    /// Draws the first image of a view, and makes the list of what could be refined.
-    fn draw_base(
+    /// Finds out who owns which pixel of a view.
+    fn look(
+        &mut self,
+        exec: Exec,
+        view: &View,
+        allowance: &Allowance<'_>,
+        stages: &mut StageTimes,
+    ) {
+        let since = allowance.elapsed_ms();
+        // Which clusters can be seen at all?
+        self.base.cull(view);
+        let culled = allowance.elapsed_ms();
+        stages.cull += culled - since;
+
+        self.base
+            .rasterize(exec, &self.world, view, &mut *self.backend);
+        stages.raster += allowance.elapsed_ms() - culled;
+        self.seen = Some(*view);
+        self.is_lit = false;
+    }
+
+    /// Gives the first image of a view its colours, and makes the list of what could be refined.
+    fn light(
         &mut self,
         exec: Exec,
         view: &View,
@@ -323,14 +360,6 @@ impl Renderer {
             *stage += now - since;
             since = now;
         };
-
-        // Which clusters can be seen at all?
-        self.base.cull(view);
-        lap(&mut stages.cull);
-
-        // Who owns which pixel?
-        self.base.rasterize(exec, &self.world, view, backend);
-        lap(&mut stages.raster);
 
         // Only vertices of triangles that own a pixel are illuminated.
         self.base
@@ -357,7 +386,7 @@ impl Renderer {
         }
         lap(&mut stages.classify);
 
-        self.shown = Some(*view);
+        self.is_lit = true;
     }
 
     /// Spends what is left of the budget, less what handing the image over will take.

@@ -78,6 +78,15 @@ pub fn build_clusters(
         .collect()
 }
 
+/// Bounds a cluster anew after its vertices have moved. `triangles` are all there are.
+///
+/// # Panics
+/// When the cluster's range or a vertex index is out of range.
+pub fn bound_again(positions: &Vec3s, triangles: &[[u32; 3]], cluster: &mut Cluster) {
+    let range = cluster.triangles.start as usize..cluster.triangles.end as usize;
+    *cluster = bound(positions, &triangles[range], cluster.triangles.start);
+}
+
 /// A triangle while it is being sorted.
 struct Item {
     corners: [u32; 3],

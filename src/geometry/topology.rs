@@ -29,11 +29,24 @@ impl Topology {
     /// When a triangle's vertex index is out of range, or there are 2^32 half-edges or more.
     #[must_use]
     pub fn new(positions: &Vec3s, triangles: &[[u32; 3]]) -> Self {
+        Self::in_groups(positions, triangles, |_| 0)
+    }
+
+    /// As [`new`](Self::new), but vertices of different groups are never at the same place, whatever their positions.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new).
+    #[must_use]
+    pub fn in_groups(
+        positions: &Vec3s,
+        triangles: &[[u32; 3]],
+        group_of_vertex: impl Fn(usize) -> u32,
+    ) -> Self {
         assert!(
             u32::try_from(triangles.len() * 3).is_ok(),
             "too many triangles to number their half-edges"
         );
-        let position_of_vertex = weld(positions);
+        let position_of_vertex = weld(positions, group_of_vertex);
         let next_on_edge = link(&position_of_vertex, triangles);
         Self {
             position_of_vertex,
@@ -58,10 +71,13 @@ impl Topology {
 }
 
 /// The position id of each vertex.
-fn weld(positions: &Vec3s) -> Vec<u32> {
-    // Adding +0 turns -0 into +0 and leaves every other number as it is.
-    let key = |i: usize| positions.get(i).map(|c| (c + 0.0).to_bits());
-    let mut order: Vec<([u32; 3], u32)> =
+fn weld(positions: &Vec3s, group_of_vertex: impl Fn(usize) -> u32) -> Vec<u32> {
+    let key = |i: usize| {
+        // Adding +0 turns -0 into +0 and leaves every other number as it is.
+        let [x, y, z] = positions.get(i).map(|c| (c + 0.0).to_bits());
+        [x, y, z, group_of_vertex(i)]
+    };
+    let mut order: Vec<([u32; 4], u32)> =
         (0..positions.len()).map(|i| (key(i), i as u32)).collect();
     order.sort_unstable();
     // First every vertex learns the first one at its place, ...

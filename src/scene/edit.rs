@@ -14,11 +14,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct Revisions {
     /// From where it is seen.
     pub camera: u64,
-    /// Which objects there are, their meshes, and which material each has.
+    /// Which objects there are, and their meshes.
     pub objects: u64,
     /// Where the objects are.
     pub transforms: u64,
-    /// Materials and ambient light.
+    /// Materials, which object has which, and ambient light.
     pub materials: u64,
     /// Light sources.
     pub lights: u64,
@@ -158,7 +158,7 @@ impl Scene {
     /// When there is no object `index`.
     pub fn set_object_material(&mut self, index: usize, material: usize) {
         let slot = &mut self.objects[index].material;
-        replace(slot, material, &mut self.revisions.objects);
+        replace(slot, material, &mut self.revisions.materials);
     }
 
     /// Adds an object and returns its index.
@@ -179,5 +179,6 @@ impl Scene {
     fn objects_changed(&mut self) {
         self.revisions.objects = fresh();
         self.revisions.transforms = fresh();
+        self.revisions.materials = fresh();
     }
 }

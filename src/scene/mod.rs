@@ -38,6 +38,7 @@ mod defaults;
 mod edit;
 mod error;
 pub mod limits;
+pub mod placement;
 mod read;
 mod shape;
 mod source;
@@ -47,6 +48,7 @@ pub mod world;
 
 pub use edit::Revisions;
 pub use error::SceneError;
+pub use placement::{Changes, GeometryChange, Placement};
 pub use view::{Eye, View};
 pub use world::{ReflectionModel, ShadingLight, ShadingMaterial, World};
 
@@ -264,19 +266,26 @@ impl Extent {
     /// The extent of `objects`.
     #[must_use]
     pub fn of(objects: &[Object]) -> Self {
-        let reference = objects
-            .first()
-            .map_or(DVec3::ZERO, |o| o.author_from_mesh.w_axis.truncate());
+        Self::of_places(
+            objects
+                .iter()
+                .map(|object| (object, &object.author_from_mesh)),
+        )
+    }
+
+    /// The extent of objects that are at other places than their own.
+    fn of_places<'a>(objects: impl Iterator<Item = (&'a Object, &'a DMat4)>) -> Self {
         let mut bounds = Bounds::EMPTY;
-        for object in objects {
-            let place = object.author_from_mesh;
-            let offset = place.w_axis.truncate() - reference;
+        let mut reference = None;
+        for (object, place) in objects {
+            let translation = place.w_axis.truncate();
+            let offset = translation - *reference.get_or_insert(translation);
             for &p in &object.mesh.positions {
                 bounds.grow(place.transform_vector3(p) + offset);
             }
         }
         Self {
-            center: reference + bounds.center(),
+            center: reference.unwrap_or(DVec3::ZERO) + bounds.center(),
             half_size: if bounds.is_empty() {
                 DVec3::ZERO
             } else {

@@ -2,20 +2,17 @@
 //!
 //! Author space is re-centred on the scene and scaled by a power of two while everything is still `f64`, so that a
 //! scene of any size, and far from its origin, keeps its digits when it becomes `f32`: with `o` the centre, `s`
-//! the scale, and `A p + t` an object's transform, a vertex is at `s (A p + (t - o))`.
-//!
-//! Normals are transformed by the inverse transpose of `A`. Its cofactor matrix is `det A` times that, hence the same but
-//! for length and sign, and needs no division.
+//! the scale, and `A p + t` an object's transform, a vertex is at `s (A p + (t - o))`. The module
+//! [`placement`](super::placement) puts objects there.
 
+use super::limits::MAX_LIGHTS;
+use super::placement::Placement;
 use super::view::View;
-use super::{
-    Camera, Extent, Light, LightKind, Material, Object, Projection, Rgb, Scene, defaults, unit,
-};
+use super::{Camera, Light, LightKind, Material, Projection, Rgb, Scene, defaults, unit};
 use crate::geometry::Vec3s;
-use crate::geometry::clusters::{Cluster, build_clusters};
+use crate::geometry::clusters::Cluster;
 use crate::geometry::topology::Topology;
-use crate::math::power_of_two_scale;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// A point light farther away than this many scene radii shines like a directional one.
 const FARTHEST_LIGHT: f64 = 1e6;
@@ -23,7 +20,7 @@ const FARTHEST_LIGHT: f64 = 1e6;
 /// All triangles, lights and materials of a scene in [world space](crate::math).
 ///
 /// Vertices and triangles of one object are consecutive. A vertex belongs to one object, hence has one material.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct World {
     /// Vertex positions.
     pub positions: Vec3s,
@@ -114,41 +111,10 @@ pub enum ReflectionModel {
 }
 
 impl World {
-    /// Prepares a scene. Triangles are reordered within each object, so that each cluster's are consecutive.
-    ///
-    /// A scene that was changed by hand cannot make this fail: a material index out of range means the last material, and
-    /// triangles with a vertex index out of range are left out.
+    /// Prepares a scene; see [`Placement::new`].
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
-        let extent = Extent::of(&scene.objects);
-        let mut world = Self {
-            background: scene.background.map(|c| c as f32),
-            author_origin: extent.center,
-            world_from_author_scale: power_of_two_scale(extent.radius()),
-            ..Self::default()
-        };
-        let fallback = [defaults::MATERIAL];
-        let materials: &[Material] = match scene.materials.as_slice() {
-            [] => &fallback,
-            materials => materials,
-        };
-        world.materials = materials
-            .iter()
-            .map(|material| ShadingMaterial::new(material, scene.ambient))
-            .collect();
-        for object in &scene.objects {
-            world.add_object(object);
-        }
-        world.radius = (0..world.positions.len())
-            .map(|i| DVec3::from(world.positions.get(i).map(f64::from)).length())
-            .fold(0.0, f64::max);
-        world.topology = Topology::new(&world.positions, &world.triangles);
-        world.lights = scene
-            .lights
-            .iter()
-            .map(|light| world.light(light))
-            .collect();
-        world
+        Placement::new(scene).1
     }
 
     /// The view of a camera, which is in author space, at an image size in pixels.
@@ -179,53 +145,37 @@ impl World {
         (p - self.author_origin) * self.world_from_author_scale
     }
 
-    fn add_object(&mut self, object: &Object) {
-        let mesh = &object.mesh;
-        let (Ok(first_vertex), Ok(first_triangle), Ok(_)) = (
-            u32::try_from(self.positions.len()),
-            u32::try_from(self.triangles.len()),
-            u32::try_from(self.positions.len() + mesh.positions.len()),
-        ) else {
-            debug_assert!(false, "a valid scene's vertices can be indexed by 32 bits");
-            return;
+    /// Copies materials; without any, the default one.
+    pub(super) fn set_materials(&mut self, materials: &[Material], ambient_light: Rgb) {
+        let fallback = [defaults::MATERIAL];
+        let materials = if materials.is_empty() {
+            &fallback
+        } else {
+            materials
         };
-        let last = self
-            .materials
-            .len()
-            .saturating_sub(1)
-            .min(usize::from(u16::MAX));
-        let material = object.material.min(last) as u16;
-        let place = object.author_from_mesh;
-        let linear = DMat3::from_mat4(place);
-        let offset = place.w_axis.truncate() - self.author_origin;
-        let normal_matrix = NormalMatrix::new(linear);
-        for (&position, &normal) in mesh.positions.iter().zip(&mesh.normals) {
-            let p = (linear * position + offset) * self.world_from_author_scale;
-            self.positions.push(p.to_array().map(|c| c as f32));
-            let n = normal_matrix.transform(normal);
-            self.normals.push(n.to_array().map(|c| c as f32));
-            self.vertex_material.push(material);
-        }
-        let start = self.triangles.len();
-        let vertices = self.positions.len() as u32 - first_vertex;
-        let whole = |t: &&[u32; 3]| t.iter().all(|&i| i < vertices);
-        self.triangles
-            .extend(mesh.triangles.iter().filter(whole).map(|t| {
-                let [a, b, c] = t.map(|i| first_vertex + i);
-                // A mirror image turns the other way round.
-                if normal_matrix.mirrors {
-                    [a, c, b]
-                } else {
-                    [a, b, c]
-                }
-            }));
-        self.triangle_material
-            .resize(self.triangles.len(), material);
-        self.clusters.extend(build_clusters(
-            &self.positions,
-            &mut self.triangles[start..],
-            first_triangle,
-        ));
+        let shading = materials
+            .iter()
+            .map(|material| ShadingMaterial::new(material, ambient_light));
+        self.materials.clear();
+        self.materials.extend(shading);
+    }
+
+    /// Copies as many lights as there may be.
+    pub(super) fn set_lights(&mut self, lights: &[Light]) {
+        let mut list = std::mem::take(&mut self.lights);
+        list.clear();
+        list.extend(
+            lights
+                .iter()
+                .take(MAX_LIGHTS)
+                .map(|light| self.light(light)),
+        );
+        self.lights = list;
+    }
+
+    /// Copies the background's colour.
+    pub(super) fn set_background(&mut self, color: Rgb) {
+        self.background = color.map(|c| c as f32);
     }
 
     fn light(&self, light: &Light) -> ShadingLight {
@@ -246,41 +196,5 @@ impl World {
             is_point,
             radiance: light.radiance.map(|c| c as f32),
         }
-    }
-}
-
-/// Transforms normals as `linear` transforms surfaces.
-struct NormalMatrix {
-    /// The inverse transpose, up to a positive factor.
-    matrix: DMat3,
-    /// Whether `linear` mirrors.
-    mirrors: bool,
-}
-
-impl NormalMatrix {
-    fn new(linear: DMat3) -> Self {
-        let largest = |m: &DMat3| {
-            m.to_cols_array()
-                .iter()
-                .fold(0.0, |a: f64, c| a.max(c.abs()))
-        };
-        // Brought near 1, products of its elements stay in range.
-        let m = linear * (1.0 / largest(&linear).max(f64::MIN_POSITIVE));
-        let cofactors = DMat3::from_cols(
-            m.y_axis.cross(m.z_axis),
-            m.z_axis.cross(m.x_axis),
-            m.x_axis.cross(m.y_axis),
-        );
-        let mirrors = m.x_axis.dot(cofactors.x_axis) < 0.0;
-        let sign = if mirrors { -1.0 } else { 1.0 };
-        Self {
-            matrix: cofactors * (sign / largest(&cofactors).max(f64::MIN_POSITIVE)),
-            mirrors,
-        }
-    }
-
-    /// The unit normal; straight up for one without a direction.
-    fn transform(&self, normal: DVec3) -> DVec3 {
-        unit(self.matrix * normal).unwrap_or(DVec3::Z)
     }
 }

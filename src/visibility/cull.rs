@@ -20,8 +20,9 @@ use crate::geometry::Cluster;
 use crate::scene::View;
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::node::Bvh2Node;
+use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use std::fmt;
 use std::ops::Range;
 
 /// How far outside of the image something must be to be dropped.
@@ -48,20 +49,28 @@ pub struct CullCounts {
 }
 
 /// Finds the clusters that may be visible. Built once for a scene; keeps its memory between frames.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Culler {
     /// Ascending by triangles.
     clusters: Vec<Cluster>,
     /// For each cluster, whether both sides of its triangles are drawn.
     two_sided: Vec<bool>,
-    /// The hierarchy's nodes, the root first; a leaf holds one cluster.
-    nodes: Vec<Bvh2Node>,
+    /// The hierarchy, its root first; a leaf holds one cluster, by its index in `clusters`.
+    hierarchy: Bvh2,
     /// Clusters that are not in the hierarchy.
     unbounded: Vec<u32>,
     /// Nodes still to visit, and the half-spaces that they may stick out of.
     stack: Vec<(u32, u8)>,
     /// For each cluster, whether it is left.
     kept: Vec<bool>,
+}
+
+impl fmt::Debug for Culler {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Culler")
+            .field("clusters", &self.clusters.len())
+            .finish_non_exhaustive()
+    }
 }
 
 impl Culler {
@@ -91,7 +100,7 @@ impl Culler {
                 unbounded.push(index);
             }
         }
-        let bvh = PlocBuilder::new().build(
+        let hierarchy = PlocBuilder::new().build(
             PlocSearchDistance::Medium,
             &boxes,
             bounded,
@@ -101,12 +110,43 @@ impl Culler {
         Self {
             kept: vec![false; clusters.len()],
             // Taking one node off and putting two on adds one for each level.
-            stack: Vec::with_capacity(bvh.max_depth + 2),
-            nodes: bvh.nodes,
+            stack: Vec::with_capacity(hierarchy.max_depth + 2),
+            hierarchy,
             clusters,
             two_sided,
             unbounded,
         }
+    }
+
+    /// Takes over the bounds of the same clusters, in ascending order of their triangles, after some of them have moved:
+    /// the hierarchy keeps its shape, and its boxes grow or shrink. Allocates only if a cluster's coordinates have become
+    /// reasonable or ceased to be so.
+    ///
+    /// # Panics
+    /// When the clusters' triangles are not those of before.
+    pub fn refit(&mut self, clusters: &[Cluster]) {
+        assert_eq!(clusters.len(), self.clusters.len(), "the same clusters");
+        for (old, new) in self.clusters.iter_mut().zip(clusters) {
+            assert_eq!(old.triangles, new.triangles, "the same clusters");
+            old.clone_from(new);
+        }
+        let indices = (0_u32..).zip(&self.clusters);
+        let unbounded = indices.filter(|(_, cluster)| bounding_box(cluster).is_none());
+        if !unbounded
+            .map(|(index, _)| index)
+            .eq(self.unbounded.iter().copied())
+        {
+            *self = Self::new(clusters, &self.two_sided);
+            return;
+        }
+        for node in &mut self.hierarchy.nodes {
+            if node.is_leaf()
+                && let Some(aabb) = bounding_box(&self.clusters[node.first_index as usize])
+            {
+                node.set_aabb(aabb);
+            }
+        }
+        self.hierarchy.refit_all();
     }
 
     /// Writes the triangles that may be visible to `out`, as ascending, disjoint and never adjacent ranges.
@@ -126,11 +166,11 @@ impl Culler {
         }
         let mut inside = self.unbounded.len() as u32;
         self.stack.clear();
-        if !self.nodes.is_empty() {
+        if !self.hierarchy.nodes.is_empty() {
             self.stack.push((0, ALL_PLANES));
         }
         while let Some((index, candidates)) = self.stack.pop() {
-            let node = self.nodes[index as usize];
+            let node = self.hierarchy.nodes[index as usize];
             let Some(crossed) = crossed_by_box(&planes, node.aabb(), candidates) else {
                 continue;
             };
