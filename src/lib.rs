@@ -22,6 +22,9 @@ pub mod schedule;
 pub mod simd;
 pub mod visibility;
 
+/// The vectors and matrices in this crate's interface.
+pub use glam;
+
 pub use frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
 pub use output::Frame;
 pub use scene::Scene;
