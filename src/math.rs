@@ -41,6 +41,17 @@ pub fn power_of_two_scale(radius: f64) -> f64 {
     libm::ldexp(1.0, -exponent.clamp(-1000, 1000))
 }
 
+/// `v` scaled to length 1 however long it is; `None` when it is zero or not finite.
+#[must_use]
+pub fn unit(v: DVec3) -> Option<DVec3> {
+    let largest = v.abs().max_element();
+    if !(largest > 0.0 && v.is_finite()) {
+        return None;
+    }
+    // Squares of the scaled components neither overflow nor vanish all; the division is by at least 1 ulp above zero.
+    Some((v / largest).normalize())
+}
+
 /// An axis-aligned box in author or world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {

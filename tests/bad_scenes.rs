@@ -172,6 +172,46 @@ const EXPECTED: &[(&str, &str)] = &[
         "materials_list",
         r#"2:16: a map `{"name": (..)}` is needed here"#,
     ),
+    (
+        "mesh_and_shape",
+        "4:32: `objects[1].mesh` is one too many: the object already has a `shape`",
+    ),
+    (
+        "mesh_crease_beyond_180",
+        "4:60: `objects[1].normals.crease_degrees` must be at most 180, but is 200",
+    ),
+    (
+        "mesh_crease_nan",
+        "4:60: `objects[1].normals.crease_degrees` must be a finite number, not NaN",
+    ),
+    (
+        "mesh_normals_flat_with_fields",
+        "4:41: nothing may follow this value",
+    ),
+    (
+        "mesh_normals_kind",
+        "4:37: unknown kind `Round`; the kinds are `File`, `Smooth` and `Flat`",
+    ),
+    (
+        "mesh_normals_of_a_shape",
+        "4:36: `objects[1].normals` is for objects with a `mesh`; this one has a `shape`",
+    ),
+    (
+        "mesh_not_a_string",
+        "4:20: a comma or a closing bracket is missing here",
+    ),
+    (
+        "mesh_up_kind",
+        "4:32: unknown kind `X`; the kinds are `Y` and `Z`",
+    ),
+    (
+        "mesh_up_of_a_shape",
+        "4:31: `objects[1].up` is for objects with a `mesh`; this one has a `shape`",
+    ),
+    (
+        "mesh_weight_kind",
+        "4:52: unknown kind `Mass`; the kinds are `Equal`, `Area` and `Angle`",
+    ),
     ("missing_colon", "2:13: a colon is missing after the name"),
     (
         "missing_comma",
@@ -192,7 +232,7 @@ const EXPECTED: &[(&str, &str)] = &[
     ("not_utf8", "2:10: this is not UTF-8 text"),
     (
         "object_no_shape",
-        "4:29: the field `shape` of `Object` is missing",
+        "4:9: `objects[1]` needs a `shape` or a `mesh`",
     ),
     (
         "object_position_number",
@@ -216,7 +256,7 @@ const EXPECTED: &[(&str, &str)] = &[
     ),
     (
         "object_unknown_field",
-        "4:27: unknown field `translate` of `Object`; the fields are `shape`, `material`, `position`, `rotate_degrees` and `scale`",
+        "4:27: unknown field `translate` of `Object`; the fields are `shape`, `mesh`, `normals`, `up`, `material`, `position`, `rotate_degrees` and `scale`",
     ),
     ("objects_not_a_list", "2:14: a list `[..]` is needed here"),
     (
@@ -313,6 +353,7 @@ fn each_bad_file_is_expected() {
     let mut found: Vec<_> = fs::read_dir(directory())
         .expect("the folder of bad scenes")
         .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "ron"))
         .map(|path| {
             path.file_stem()
                 .unwrap_or_default()

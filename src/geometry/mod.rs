@@ -2,6 +2,9 @@
 
 pub mod bary;
 pub mod clusters;
+pub mod import;
+pub mod normals;
+pub mod polygon;
 pub mod screen;
 pub mod shapes;
 pub mod topology;

@@ -16,11 +16,14 @@ pub enum SceneError {
         /// What the system said.
         source: io::Error,
     },
-    /// The file is larger than [`MAX_FILE_BYTES`](super::limits::MAX_FILE_BYTES).
-    #[error("scene '{}' is larger than {} MiB", path.display(), super::limits::MAX_FILE_BYTES >> 20)]
+    /// The file is larger than [`MAX_FILE_BYTES`](super::limits::MAX_FILE_BYTES), or a mesh file larger than
+    /// [`MAX_MESH_BYTES`](super::limits::MAX_MESH_BYTES).
+    #[error("scene '{}' is larger than {} MiB", path.display(), limit >> 20)]
     TooLarge {
         /// The file asked for.
         path: PathBuf,
+        /// Most bytes it may have.
+        limit: u64,
     },
     /// The contents are not a valid scene.
     #[error("{file}:{line}:{column}: {message}")]
@@ -45,7 +48,7 @@ impl SceneError {
 }
 
 /// The system's reason in plain words, where it has a common one.
-fn reason(error: &io::Error) -> String {
+pub(super) fn reason(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file".to_owned(),
         io::ErrorKind::IsADirectory => "it is a directory".to_owned(),

@@ -13,6 +13,9 @@ pub const MAX_TRIANGLES: u64 = 16_000_000;
 /// Most bytes of a scene file.
 pub const MAX_FILE_BYTES: u64 = 64 << 20;
 
+/// Most bytes of a mesh file.
+pub const MAX_MESH_BYTES: u64 = 1 << 30;
+
 /// Largest magnitude of a coordinate or length. Products of four lengths still fit an `f64`.
 pub const MAX_LENGTH: f64 = 1e60;
 

@@ -37,7 +37,10 @@
 mod defaults;
 mod edit;
 mod error;
+mod file;
 pub mod limits;
+mod mesh_file;
+mod mesh_scene;
 pub mod placement;
 mod read;
 mod shape;
@@ -48,15 +51,15 @@ pub mod world;
 
 pub use edit::Revisions;
 pub use error::SceneError;
+pub use mesh_file::{MeshUp, load_mesh};
 pub use placement::{Changes, GeometryChange, Placement};
 pub use view::{Eye, View};
 pub use world::{ReflectionModel, ShadingLight, ShadingMaterial, World};
 
 use crate::geometry::Mesh;
 use crate::math::Bounds;
+pub(crate) use crate::math::unit;
 use glam::{DMat4, DVec3};
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -82,36 +85,36 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Reads a scene file.
+    /// Reads a scene file, or a mesh file whose name ends in `.obj`, which is shown alone: seen from the front and above, under
+    /// three lights, in a shiny material. Paths of mesh files in a scene file start from its folder.
     ///
     /// # Errors
     /// When the file cannot be read ([`SceneError::is_io`]), or does not hold a valid scene.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
-        let bytes = read_bytes(path).map_err(|source| SceneError::Io {
-            path: path.to_owned(),
-            source,
-        })?;
-        if bytes.len() as u64 > limits::MAX_FILE_BYTES {
-            return Err(SceneError::TooLarge {
-                path: path.to_owned(),
-            });
+        if mesh_file::is_mesh(path) {
+            return mesh_scene::load(path);
         }
-        let file_name = path.to_string_lossy();
-        match std::str::from_utf8(&bytes) {
-            Ok(text) => Self::parse(text, &file_name),
-            Err(error) => Err(not_utf8(&bytes[..error.valid_up_to()], &file_name)),
-        }
+        let text = file::read_text(path, limits::MAX_FILE_BYTES)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::parse_in(&text, &path.to_string_lossy(), folder)
     }
 
-    /// Reads a scene from the text of a scene file. `file_name` is what messages call it.
+    /// Reads a scene from the text of a scene file. `file_name` is what messages call it; paths of mesh files start from the
+    /// folder that it names, or from the current one when it names none.
     ///
     /// # Errors
     /// When the text is not a valid scene.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, SceneError> {
+        let folder = Path::new(file_name).parent().unwrap_or(Path::new(""));
+        Self::parse_in(text, file_name, folder)
+    }
+
+    fn parse_in(text: &str, file_name: &str, folder: &Path) -> Result<Self, SceneError> {
         read::scene(&source::Source {
             text: text.strip_prefix('\u{feff}').unwrap_or(text),
             file: file_name,
+            folder,
         })
     }
 
@@ -141,30 +144,6 @@ impl Scene {
 /// Where the objects are.
 fn places(objects: &[Object]) -> Vec<DMat4> {
     objects.iter().map(|o| o.author_from_mesh).collect()
-}
-
-/// The file's contents, cut off one byte beyond the limit.
-fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
-    let file = File::open(path)?;
-    if file.metadata()?.is_dir() {
-        // Not every system refuses to read from a directory with a telling error.
-        return Err(std::io::ErrorKind::IsADirectory.into());
-    }
-    let mut bytes = Vec::new();
-    file.take(limits::MAX_FILE_BYTES + 1)
-        .read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-/// The error for a file that is not text, `valid` being what can be read before the fault.
-fn not_utf8(valid: &[u8], file_name: &str) -> SceneError {
-    let (line, column) = source::line_and_column(&String::from_utf8_lossy(valid));
-    SceneError::Invalid {
-        file: file_name.to_owned(),
-        line,
-        column,
-        message: "this is not UTF-8 text".to_owned(),
-    }
 }
 
 /// A camera in author space.
@@ -299,14 +278,4 @@ impl Extent {
     pub fn radius(&self) -> f64 {
         self.half_size.length()
     }
-}
-
-/// `v` scaled to length 1 however long it is; `None` when it is zero or not finite.
-pub(crate) fn unit(v: DVec3) -> Option<DVec3> {
-    let largest = v.abs().max_element();
-    if !(largest > 0.0 && v.is_finite()) {
-        return None;
-    }
-    // Squares of the scaled components neither overflow nor vanish all; the division is by at least 1 ulp above zero.
-    Some((v / largest).normalize())
 }

@@ -13,6 +13,7 @@ use ron::extensions::Extensions;
 use ron::value::RawValue;
 use serde::{Deserialize, Deserializer};
 use std::fmt::Display;
+use std::path::Path;
 
 /// The text of one value in a scene file, as a slice of the file.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +70,8 @@ pub(super) struct Source<'a> {
     pub(super) text: &'a str,
     /// The file's name, for messages.
     pub(super) file: &'a str,
+    /// The folder that paths in the file start from.
+    pub(super) folder: &'a Path,
 }
 
 impl<'a> Source<'a> {
@@ -81,7 +84,10 @@ impl<'a> Source<'a> {
     pub(super) fn parse<T: Deserialize<'a>>(&self, raw: Raw<'a>) -> Result<T, SceneError> {
         let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
         options.from_str(raw.0).map_err(|error| {
-            let (message, place) = describe(&error.code);
+            let (mut message, place) = describe(&error.code);
+            if error.code == ron::Error::TrailingCharacters && raw.0.len() < self.whole().0.len() {
+                "nothing may follow this value".clone_into(&mut message);
+            }
             let inner = match place {
                 Place::Start => error.span.start,
                 Place::End => error.span.end,

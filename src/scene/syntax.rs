@@ -109,11 +109,47 @@ pub(super) enum ModelEntry {
 #[derive(Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields, rename = "Object", bound(deserialize = "'de: 'a"))]
 pub(super) struct ObjectEntry<'a> {
-    pub(super) shape: Raw<'a>,
+    pub(super) shape: Option<Raw<'a>>,
+    pub(super) mesh: Option<Raw<'a>>,
+    pub(super) normals: Option<Raw<'a>>,
+    pub(super) up: Option<Raw<'a>>,
     pub(super) material: Option<Raw<'a>>,
     pub(super) position: Option<Raw<'a>>,
     pub(super) rotate_degrees: Option<Raw<'a>>,
     pub(super) scale: Option<Raw<'a>>,
+}
+
+/// `normals:` of an object.
+#[derive(Debug, serde::Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    rename = "Normals",
+    bound(deserialize = "'de: 'a")
+)]
+pub(super) enum NormalsEntry<'a> {
+    File,
+    Smooth {
+        crease_degrees: Option<Raw<'a>>,
+        weight: Option<WeightEntry>,
+    },
+    Flat,
+}
+
+/// `weight:` of smooth normals.
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+#[serde(rename = "Weight")]
+pub(super) enum WeightEntry {
+    Equal,
+    Area,
+    Angle,
+}
+
+/// `up:` of an object.
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+#[serde(rename = "Up")]
+pub(super) enum UpEntry {
+    Y,
+    Z,
 }
 
 /// `shape:` of an object.

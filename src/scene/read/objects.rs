@@ -1,15 +1,20 @@
 //! `objects:` of a scene file.
 
 use super::super::Object;
-use super::super::error::SceneError;
+use super::super::error::{SceneError, reason};
 use super::super::limits::{MAX_SEGMENTS, MAX_TRIANGLES};
+use super::super::mesh_file::{MeshUp, load_mesh};
 use super::super::shape::Shape;
-use super::super::source::{Raw, Source};
-use super::super::syntax::{ObjectEntry, ShapeEntry};
+use super::super::source::{Field, Raw, Source};
+use super::super::syntax::{NormalsEntry, ObjectEntry, ShapeEntry, UpEntry, WeightEntry};
 use super::Materials;
 use crate::geometry::Mesh;
+use crate::geometry::import::Normals;
+use crate::geometry::normals::{CREASE_DEGREES, Weight};
 use glam::{DMat3, DMat4, DVec3};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Reads the objects, of which there is at least one.
@@ -25,36 +30,168 @@ pub(super) fn objects(
             "the scene has no objects; `objects` must name at least one",
         ));
     }
+    let mut meshes = Meshes::default();
     let mut planned = Vec::with_capacity(entries.len());
     let mut triangles = 0_u64;
     for (index, &raw) in entries.iter().enumerate() {
         let entry: ObjectEntry<'_> = source.parse(raw)?;
         let at = format!("objects[{index}]");
-        let (shape, size) = shape(source, entry.shape, &at)?;
-        triangles += shape.triangles();
+        let (geometry, size) = geometry(source, raw, &entry, &at, &mut meshes)?;
+        triangles += geometry.triangles();
         if triangles > MAX_TRIANGLES {
-            return Err(source.field(entry.shape, format_args!("{at}.shape")).fail(
+            let (raw, name) = match entry.mesh {
+                Some(mesh) => (mesh, "mesh"),
+                None => (entry.shape.unwrap_or(raw), "shape"),
+            };
+            return Err(source.field(raw, format_args!("{at}.{name}")).fail(
                 format_args!(
                     "brings the scene to {triangles} triangles; at most {MAX_TRIANGLES} are possible"
                 ),
             ));
         }
         let material = materials.find(source, entry.material, format_args!("{at}.material"))?;
-        planned.push((shape, material, place(source, &entry, size, &at)?));
+        planned.push((geometry, material, place(source, &entry, size, &at)?));
     }
-    // Only now, with everything checked, is memory taken.
-    let mut meshes: HashMap<[u64; 4], Arc<Mesh>> = HashMap::new();
+    // Only now, with everything checked, is memory taken for shapes.
+    let mut shapes: HashMap<[u64; 4], Arc<Mesh>> = HashMap::new();
     Ok(planned
         .into_iter()
-        .map(|(shape, material, author_from_mesh)| Object {
-            mesh: meshes
-                .entry(shape.key())
-                .or_insert_with(|| Arc::new(shape.mesh()))
-                .clone(),
+        .map(|(geometry, material, author_from_mesh)| Object {
+            mesh: match geometry {
+                Geometry::Mesh(mesh) => mesh,
+                Geometry::Shape(shape) => shapes
+                    .entry(shape.key())
+                    .or_insert_with(|| Arc::new(shape.mesh()))
+                    .clone(),
+            },
             material,
             author_from_mesh,
         })
         .collect())
+}
+
+/// What an object looks like.
+enum Geometry {
+    /// A shape, yet to be made.
+    Shape(Shape),
+    /// A mesh from a file.
+    Mesh(Arc<Mesh>),
+}
+
+impl Geometry {
+    fn triangles(&self) -> u64 {
+        match self {
+            Self::Shape(shape) => shape.triangles(),
+            Self::Mesh(mesh) => mesh.triangles.len() as u64,
+        }
+    }
+}
+
+/// The geometry of an object whose entry is `whole`, and the linear map from its space to the object's before
+/// that is placed.
+fn geometry<'a>(
+    source: &Source<'a>,
+    whole: Raw<'a>,
+    entry: &ObjectEntry<'a>,
+    at: &str,
+    meshes: &mut Meshes,
+) -> Result<(Geometry, DMat3), SceneError> {
+    match (entry.shape, entry.mesh) {
+        (Some(raw), None) => {
+            for (option, name) in [(entry.normals, "normals"), (entry.up, "up")] {
+                if let Some(option) = option {
+                    return Err(source
+                        .field(option, format_args!("{at}.{name}"))
+                        .fail("is for objects with a `mesh`; this one has a `shape`"));
+                }
+            }
+            let (shape, size) = shape(source, raw, at)?;
+            Ok((Geometry::Shape(shape), DMat3::from_diagonal(size)))
+        }
+        (None, Some(raw)) => {
+            let normals = entry
+                .normals
+                .map_or(Ok(Normals::default()), |raw| normals(source, raw, at))?;
+            let up = match entry.up.map(|raw| source.parse(raw)).transpose()? {
+                Some(UpEntry::Y) => MeshUp::Y,
+                Some(UpEntry::Z) => MeshUp::Z,
+                None => MeshUp::default(),
+            };
+            let field = source.field(raw, format_args!("{at}.mesh"));
+            let mesh = meshes.load(source, &field, normals)?;
+            Ok((Geometry::Mesh(mesh), up.scene_from_file()))
+        }
+        (Some(_), Some(raw)) => Err(source
+            .field(raw, format_args!("{at}.mesh"))
+            .fail("is one too many: the object already has a `shape`")),
+        (None, None) => {
+            Err(source.error(whole, format_args!("`{at}` needs a `shape` or a `mesh`")))
+        }
+    }
+}
+
+/// Mesh files read so far.
+#[derive(Default)]
+struct Meshes(HashMap<(PathBuf, [u64; 2]), Arc<Mesh>>);
+
+impl Meshes {
+    /// The mesh of the file that `field` names, read once for each way to make normals.
+    fn load(
+        &mut self,
+        source: &Source<'_>,
+        field: &Field<'_>,
+        normals: Normals,
+    ) -> Result<Arc<Mesh>, SceneError> {
+        let name = field.text()?;
+        let path = source.folder.join(&name);
+        let key = match normals {
+            Normals::File => [0, 0],
+            Normals::Flat => [1, 0],
+            Normals::Smooth {
+                crease_degrees,
+                weight,
+            } => [2 + weight as u64, crease_degrees.to_bits()],
+        };
+        match self.0.entry((path, key)) {
+            Entry::Occupied(known) => Ok(known.get().clone()),
+            Entry::Vacant(new) => {
+                let mesh = load_mesh(&new.key().0, normals).map_err(|error| match error {
+                    // The scene is what has to be changed.
+                    SceneError::Io { source, path } => field.fail(format_args!(
+                        "cannot be read from '{}': {}",
+                        path.display(),
+                        reason(&source)
+                    )),
+                    other => other,
+                })?;
+                Ok(new.insert(Arc::new(mesh)).clone())
+            }
+        }
+    }
+}
+
+/// Where the normals of a mesh come from.
+fn normals(source: &Source<'_>, raw: Raw<'_>, at: &str) -> Result<Normals, SceneError> {
+    Ok(match source.parse(raw)? {
+        NormalsEntry::File => Normals::File,
+        NormalsEntry::Flat => Normals::Flat,
+        NormalsEntry::Smooth {
+            crease_degrees,
+            weight,
+        } => Normals::Smooth {
+            crease_degrees: crease_degrees.map_or(Ok(CREASE_DEGREES), |raw| {
+                source
+                    .field(raw, format_args!("{at}.normals.crease_degrees"))
+                    .up_to(180.0)
+            })?,
+            weight: match weight {
+                Some(WeightEntry::Equal) => Weight::Equal,
+                Some(WeightEntry::Area) => Weight::Area,
+                Some(WeightEntry::Angle) => Weight::Angle,
+                None => Weight::default(),
+            },
+        },
+    })
 }
 
 /// A shape, and the factors by which its mesh must be scaled to have the size asked for.
@@ -135,11 +272,11 @@ fn shape<'a>(source: &Source<'a>, raw: Raw<'a>, at: &str) -> Result<(Shape, DVec
     })
 }
 
-/// Where an object is: scaled, turned about x, then y, then z, and moved.
+/// Where an object is: given its `size`, scaled, turned about x, then y, then z, and moved.
 fn place(
     source: &Source<'_>,
     entry: &ObjectEntry<'_>,
-    size: DVec3,
+    size: DMat3,
     at: &str,
 ) -> Result<DMat4, SceneError> {
     let field = |raw, name: &str| source.field(raw, format_args!("{at}.{name}"));
@@ -152,7 +289,7 @@ fn place(
     let scale = entry
         .scale
         .map_or(Ok(DVec3::ONE), |raw| field(raw, "scale").scale())?;
-    let linear = rotation(angles) * DMat3::from_diagonal(scale * size);
+    let linear = rotation(angles) * (DMat3::from_diagonal(scale) * size);
     Ok(DMat4::from_cols(
         linear.x_axis.extend(0.0),
         linear.y_axis.extend(0.0),

@@ -1,0 +1,165 @@
+//! A scene around a mesh that is opened by itself: something good to look at for any mesh of any size.
+//!
+//! The camera looks from the front, from the right and above. It is as near as it can be with every vertex inside the image, and
+//! looks at its middle: along the camera's axes (x right, y up, z backward) the eye `e` sees a point `p` if
+//! `|p.x - e.x| <= w (e.z - p.z)`, `w` being the tangent of half the opening angle. Hence, with `a` the largest `p.x + w p.z`
+//! and `b` the largest `-p.x + w p.z` of all points, `e.x = (a - b) / 2` sees all of them from `e.z = (a + b) / (2 w)` on, and
+//! not from nearer by; likewise for y. In the direction that decides the distance the mesh is exactly centred, in the other nearly.
+//!
+//! A key light from the upper left, a weak fill light from the right and a rim light from behind are
+//! placed relative to the view and the size of the mesh.
+
+use super::error::SceneError;
+use super::mesh_file::{MeshUp, load_mesh};
+use super::{
+    Camera, Extent, Light, LightKind, Material, Object, Projection, ReflectionModel, Rgb, Scene,
+};
+use crate::geometry::import::Normals;
+use crate::math::Bounds;
+use glam::{DMat3, DMat4, DVec3};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Vertical opening angle in degrees: narrow, so that near parts are not much larger than far ones.
+const FOV_DEGREES: f64 = 28.0;
+
+/// Width over height of the narrowest image that everything is in.
+const ASPECT: f64 = 4.0 / 3.0;
+
+/// The share of the image that the mesh may fill in each direction.
+const FILL: f64 = 0.86;
+
+/// From the mesh to the eye: in front, somewhat from the right and from above.
+const TOWARDS_EYE: DVec3 = DVec3::new(0.50, -0.78, 0.40);
+
+/// Lights: where from the middle of the mesh along the camera's axes (right, up, backward), in radii of the mesh, and colour.
+const LIGHTS: [(DVec3, Rgb); 3] = [
+    (DVec3::new(-2.4, 2.8, 3.2), [1.10, 1.06, 1.00]),
+    (DVec3::new(4.0, 0.4, 2.2), [0.20, 0.24, 0.32]),
+    (DVec3::new(2.4, 2.2, -3.0), [0.80, 0.90, 1.00]),
+];
+
+const AMBIENT: Rgb = [0.16, 0.17, 0.19];
+
+const BACKGROUND: Rgb = [0.022, 0.026, 0.034];
+
+const MATERIAL: Material = Material {
+    ambient: [1.0; 3],
+    diffuse: [0.46, 0.17, 0.085],
+    specular: [0.42, 0.40, 0.38],
+    shininess: 70.0,
+    model: ReflectionModel::BlinnPhong,
+    // The faces of many files turn either way, and many are open.
+    two_sided: true,
+};
+
+/// Loads a mesh file and puts it into a scene.
+pub(super) fn load(path: &Path) -> Result<Scene, SceneError> {
+    let mesh = load_mesh(path, Normals::default())?;
+    let object = Object {
+        mesh: Arc::new(mesh),
+        material: 0,
+        author_from_mesh: DMat4::from_mat3(MeshUp::default().scene_from_file()),
+    };
+    let view = Stage::of(&object);
+    let mut scene = Scene::new(vec![MATERIAL], vec![object]);
+    scene.camera = view.camera();
+    scene.lights = view.lights();
+    scene.ambient = AMBIENT;
+    scene.background = BACKGROUND;
+    scene.touch();
+    Ok(scene)
+}
+
+/// Where a mesh is and how it is looked at.
+#[derive(Clone, Copy, Debug)]
+struct Stage {
+    center: DVec3,
+    radius: f64,
+    /// The camera's axes: right, up and backward.
+    axes: DMat3,
+    /// The eye, from the centre along the axes.
+    eye: DVec3,
+}
+
+impl Stage {
+    fn of(object: &Object) -> Self {
+        let extent = Extent::of(std::slice::from_ref(object));
+        let center = extent.center;
+        let backward = TOWARDS_EYE.normalize();
+        let right = DVec3::Z.cross(backward).normalize();
+        let axes = DMat3::from_cols(right, backward.cross(right), backward);
+        let points =
+            object.mesh.positions.iter().map(|&p| {
+                axes.transpose() * (object.author_from_mesh.transform_point3(p) - center)
+            });
+        // A mesh that is a single point is looked at from nearby.
+        let radius = if extent.radius() > 0.0 {
+            extent.radius()
+        } else {
+            1.0
+        };
+        let mut eye = eye(points);
+        if extent.radius() <= 0.0 {
+            eye.z = 4.0;
+        }
+        Self {
+            center,
+            radius,
+            axes,
+            eye,
+        }
+    }
+
+    /// The point at a place given along the camera's axes.
+    fn at(&self, place: DVec3) -> DVec3 {
+        self.center + self.axes * place
+    }
+
+    fn camera(&self) -> Camera {
+        Camera {
+            position: self.at(self.eye),
+            target: self.at(self.eye.with_z(0.0)),
+            up: DVec3::Z,
+            projection: Projection::Perspective {
+                fov_degrees: FOV_DEGREES,
+            },
+            near: None,
+            far: None,
+        }
+    }
+
+    fn lights(&self) -> Vec<Light> {
+        LIGHTS
+            .iter()
+            .map(|&(place, radiance)| Light {
+                kind: LightKind::Point {
+                    position: self.at(place * self.radius),
+                },
+                radiance,
+            })
+            .collect()
+    }
+}
+
+/// The nearest eye that sees all points, which are given along the camera's axes.
+fn eye(points: impl Iterator<Item = DVec3>) -> DVec3 {
+    let height = libm::tan((FOV_DEGREES * 0.5).to_radians()) * FILL;
+    let width = height * ASPECT;
+    // Largest p.x + w p.z and p.y + h p.z; smallest p.x - w p.z and p.y - h p.z.
+    let mut bounds = Bounds::EMPTY;
+    let mut nearest = 0.0_f64;
+    for p in points {
+        let (w, h) = (width * p.z, height * p.z);
+        bounds.max = bounds.max.max(DVec3::new(p.x + w, p.y + h, p.z));
+        bounds.min = bounds.min.min(DVec3::new(p.x - w, p.y - h, p.z));
+        nearest = nearest.max(p.z);
+    }
+    if bounds.is_empty() {
+        return DVec3::Z;
+    }
+    let size = bounds.max - bounds.min;
+    let distance = (size.x / (2.0 * width)).max(size.y / (2.0 * height));
+    let middle = bounds.center();
+    DVec3::new(middle.x, middle.y, distance.max(nearest))
+}
