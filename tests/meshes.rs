@@ -561,8 +561,8 @@ fn a_mesh_opened_by_itself_fills_the_middle_of_the_image() {
             let [left, right, top, bottom] = seen(&scene, [1280, 960]);
             let fill = (right - left).max(bottom - top);
             assert!((1.7..1.74).contains(&fill), "fills {fill} of 2");
-            assert!((left + right).abs() < 0.05, "{left} to {right}");
-            assert!((top + bottom).abs() < 0.05, "{top} to {bottom}");
+            assert!((left + right).abs() < 0.01, "{left} to {right}");
+            assert!((top + bottom).abs() < 0.01, "{top} to {bottom}");
             let [left, right, top, bottom] = seen(&scene, [1280, 720]);
             assert!(left > -0.9 && right < 0.9 && top > -0.9 && bottom < 0.9);
             assert!(scene.materials[0].two_sided);

@@ -54,7 +54,7 @@ Examples:
   Frame times for a script:
     specula render scenes/teapot.ron -o teapot.png --budget 2 --frames 100 --json | jq .frame_ms")]
 pub(super) struct Render {
-    /// Scene file (RON)
+    /// Scene file (.ron), or a mesh (.obj), which gets a camera, lights and a material
     pub(super) scene: PathBuf,
 
     /// Image to write; its name ends in .png
@@ -104,7 +104,7 @@ Examples:
   How an image gets better from frame to frame:
     specula sweep scenes/teapot.ron --methods adaptive --fractions 0.1 --frames 20")]
 pub(super) struct Sweep {
-    /// Scene files (RON)
+    /// Scene files (.ron) or meshes (.obj)
     #[arg(required = true, value_name = "SCENE")]
     pub(super) scenes: Vec<PathBuf>,
 

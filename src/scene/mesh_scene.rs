@@ -4,7 +4,9 @@
 //! looks at its middle: along the camera's axes (x right, y up, z backward) the eye `e` sees a point `p` if
 //! `|p.x - e.x| <= w (e.z - p.z)`, `w` being the tangent of half the opening angle. Hence, with `a` the largest `p.x + w p.z`
 //! and `b` the largest `-p.x + w p.z` of all points, `e.x = (a - b) / 2` sees all of them from `e.z = (a + b) / (2 w)` on, and
-//! not from nearer by; likewise for y. In the direction that decides the distance the mesh is exactly centred, in the other nearly.
+//! not from nearer by; likewise for y.
+//! In the other direction the eye is then moved to the middle of what it sees, by a few steps that each balance the two outermost
+//! points.
 //!
 //! A key light from the upper left, a weak fill light from the right and a rim light from behind are
 //! placed relative to the view and the size of the mesh.
@@ -28,6 +30,9 @@ const ASPECT: f64 = 4.0 / 3.0;
 
 /// The share of the image that the mesh may fill in each direction.
 const FILL: f64 = 0.86;
+
+/// Steps by which the mesh is centred; each brings it several times nearer to the middle.
+const CENTERINGS: usize = 4;
 
 /// From the mesh to the eye: in front, somewhat from the right and from above.
 const TOWARDS_EYE: DVec3 = DVec3::new(0.50, -0.78, 0.40);
@@ -89,20 +94,21 @@ impl Stage {
         let backward = TOWARDS_EYE.normalize();
         let right = DVec3::Z.cross(backward).normalize();
         let axes = DMat3::from_cols(right, backward.cross(right), backward);
-        let points =
-            object.mesh.positions.iter().map(|&p| {
-                axes.transpose() * (object.author_from_mesh.transform_point3(p) - center)
-            });
-        // A mesh that is a single point is looked at from nearby.
+        // A mesh that is a single point is looked at as if it had a size.
         let radius = if extent.radius() > 0.0 {
             extent.radius()
         } else {
             1.0
         };
-        let mut eye = eye(points);
-        if extent.radius() <= 0.0 {
-            eye.z = 4.0;
-        }
+        // In units of the radius, so that no size is too small or too large.
+        let points: Vec<DVec3> = object
+            .mesh
+            .positions
+            .iter()
+            .map(|&p| object.author_from_mesh.transform_point3(p) - center)
+            .map(|p| axes.transpose() * (p / radius))
+            .collect();
+        let eye = eye(&points) * radius;
         Self {
             center,
             radius,
@@ -143,23 +149,49 @@ impl Stage {
 }
 
 /// The nearest eye that sees all points, which are given along the camera's axes.
-fn eye(points: impl Iterator<Item = DVec3>) -> DVec3 {
+fn eye(points: &[DVec3]) -> DVec3 {
     let height = libm::tan((FOV_DEGREES * 0.5).to_radians()) * FILL;
     let width = height * ASPECT;
     // Largest p.x + w p.z and p.y + h p.z; smallest p.x - w p.z and p.y - h p.z.
     let mut bounds = Bounds::EMPTY;
-    let mut nearest = 0.0_f64;
     for p in points {
         let (w, h) = (width * p.z, height * p.z);
         bounds.max = bounds.max.max(DVec3::new(p.x + w, p.y + h, p.z));
         bounds.min = bounds.min.min(DVec3::new(p.x - w, p.y - h, p.z));
-        nearest = nearest.max(p.z);
     }
     if bounds.is_empty() {
         return DVec3::Z;
     }
     let size = bounds.max - bounds.min;
     let distance = (size.x / (2.0 * width)).max(size.y / (2.0 * height));
-    let middle = bounds.center();
-    DVec3::new(middle.x, middle.y, distance.max(nearest))
+    // All in one place: any distance will do.
+    let distance = if distance > bounds.max.z {
+        distance
+    } else {
+        bounds.max.z + 1.0
+    };
+    let mut eye = bounds.center().with_z(distance);
+    for _ in 0..CENTERINGS {
+        eye.x = centered(points, eye, |p| p.x);
+        eye.y = centered(points, eye, |p| p.y);
+    }
+    eye
+}
+
+/// Where the eye has to be along one axis for the two points seen farthest to either side, `a` and `b`, to be equally far from
+/// the middle of the image: `(e - a) / depth a = (b - e) / depth b`. Depths are positive.
+fn centered(points: &[DVec3], eye: DVec3, along: impl Fn(DVec3) -> f64) -> f64 {
+    let seen = |p: DVec3| (along(p) - along(eye)) / (eye.z - p.z);
+    let mut ends = [points[0]; 2];
+    for &p in points {
+        if seen(p) < seen(ends[0]) {
+            ends[0] = p;
+        }
+        if seen(p) > seen(ends[1]) {
+            ends[1] = p;
+        }
+    }
+    let [a, b] = ends;
+    let depths = [eye.z - a.z, eye.z - b.z];
+    (along(a) * depths[1] + along(b) * depths[0]) / (depths[0] + depths[1])
 }
