@@ -497,28 +497,28 @@ fn a_scene_places_a_mesh_relative_to_its_file() {
     assert_eq!(scene.triangle_count(), 48);
     assert_eq!(parsed.triangle_count(), 48);
     let vertices: Vec<_> = scene
-        .objects
+        .objects()
         .iter()
         .map(|o| o.mesh.positions.len())
         .collect();
     assert_eq!(vertices, [24, 24, 8, 24]);
     assert!(
-        std::sync::Arc::ptr_eq(&scene.objects[0].mesh, &scene.objects[1].mesh),
+        std::sync::Arc::ptr_eq(&scene.objects()[0].mesh, &scene.objects()[1].mesh),
         "read once"
     );
     // The file's y axis points up in the scene, its z axis to the front; scaling is along the scene's axes.
-    let place = scene.objects[1].author_from_mesh;
+    let place = scene.objects()[1].author_from_mesh;
     assert_eq!(place.transform_vector3(DVec3::Y), DVec3::Z * 2.0);
     assert_eq!(place.transform_vector3(DVec3::Z), DVec3::NEG_Y);
     assert_eq!(place.transform_point3(DVec3::X), DVec3::new(4.0, 0.0, 0.0));
-    let as_it_is = scene.objects[3].author_from_mesh;
+    let as_it_is = scene.objects()[3].author_from_mesh;
     assert_eq!(as_it_is.transform_vector3(DVec3::Z), DVec3::Z);
 }
 
 /// Where the vertices of a scene appear: the box around them, in parts of the image from -1 to 1.
 fn seen(scene: &Scene, [width, height]: [u32; 2]) -> [f64; 4] {
     let world = World::new(scene);
-    let view = world.view(&scene.camera, width, height);
+    let view = world.view(scene.camera(), width, height);
     let mut seen = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
     for i in 0..world.positions.len() {
         let p = view.project(world.positions.get(i));
@@ -565,13 +565,13 @@ fn a_mesh_opened_by_itself_fills_the_middle_of_the_image() {
             assert!((top + bottom).abs() < 0.01, "{top} to {bottom}");
             let [left, right, top, bottom] = seen(&scene, [1280, 720]);
             assert!(left > -0.9 && right < 0.9 && top > -0.9 && bottom < 0.9);
-            assert!(scene.materials[0].two_sided);
-            assert_eq!(scene.lights.len(), 3);
-            for light in &scene.lights {
+            assert!(scene.materials()[0].two_sided);
+            assert_eq!(scene.lights().len(), 3);
+            for light in scene.lights() {
                 let LightKind::Point { position } = light.kind else {
                     panic!("a point light");
                 };
-                let distance = (position - scene.camera.target).length();
+                let distance = (position - scene.camera().target).length();
                 assert!(distance > 0.0 && distance.is_finite());
             }
         }

@@ -66,13 +66,12 @@ pub(super) fn load(path: &Path) -> Result<Scene, SceneError> {
         material: 0,
         author_from_mesh: DMat4::from_mat3(MeshUp::default().scene_from_file()),
     };
-    let view = Stage::of(&object);
+    let stage = Stage::of(&object);
     let mut scene = Scene::new(vec![MATERIAL], vec![object]);
-    scene.camera = view.camera();
-    scene.lights = view.lights();
-    scene.ambient = AMBIENT;
-    scene.background = BACKGROUND;
-    scene.touch();
+    scene.set_camera(stage.camera());
+    scene.set_lights(stage.lights());
+    scene.set_ambient(AMBIENT);
+    scene.set_background(BACKGROUND);
     Ok(scene)
 }
 
