@@ -11,7 +11,7 @@
 //! point do not influence each other. Faces are whole polygons: how they are triangulated later does not matter.
 //!
 //! Invariants: every normal is a unit vector. A face without area contributes nothing and connects nothing. Time is
-//! O(n log n) in the number of corners; at edges with more than [`MOST_AT_AN_EDGE`] faces there is always a crease.
+//! O(n log n) in the number of corners; at edges with more than eight faces there is always a crease.
 
 use super::polygon::Polygons;
 use crate::math::{Bounds, power_of_two_scale, unit};
