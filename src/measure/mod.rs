@@ -1,9 +1,13 @@
-//! Measuring images: the Phong reference, error metrics, and sweeps of error against time.
+//! Measuring images: the Phong reference, error metrics, sweeps of error against time, and looking into an image.
 
+pub mod inspection;
 pub mod metrics;
+pub mod overlay;
 pub mod reference;
 pub mod sweep;
 
+pub use inspection::Inspection;
 pub use metrics::{ErrorHistogram, ErrorReport, SizeMismatch};
+pub use overlay::{Layer, draw_overlay};
 pub use reference::ReferenceImage;
 pub use sweep::{Calibration, Sweep, SweepBudget, SweepOptions, SweepRow};

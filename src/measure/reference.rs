@@ -132,7 +132,7 @@ impl ReferenceImage {
 type Row<'a> = (usize, &'a mut [[u8; 3]], &'a mut [[f64; 3]], &'a mut [bool]);
 
 /// Who owns each pixel: the nearest triangle, and of equally near ones that with the smallest id.
-fn owners(world: &World, view: &View, corners: &[PixelPoint]) -> Vec<u32> {
+pub(super) fn owners(world: &World, view: &View, corners: &[PixelPoint]) -> Vec<u32> {
     let len = view.width as usize * view.height as usize;
     let mut ids = vec![NO_TRIANGLE; len];
     let mut depths = vec![f32::NEG_INFINITY; len];
