@@ -1,5 +1,7 @@
 //! What can be said on the command line.
 
+use super::bench::Bench;
+use super::inspect::Inspect;
 use clap::{Args, Parser, Subcommand};
 use specula::frame::Method;
 use specula::geometry::screen::MAX_IMAGE_SIDE;
@@ -34,6 +36,10 @@ pub(super) enum Command {
     Render(Render),
     /// Measure error against time: methods x budgets, every row from a cold engine
     Sweep(Sweep),
+    /// Measure frame times over views from all around a scene
+    Bench(Bench),
+    /// Say what a view consists of, and draw it over the image
+    Inspect(Inspect),
 }
 
 /// `specula render`.
@@ -246,7 +252,7 @@ fn size(text: &str) -> Result<Size, String> {
     Ok(Size { width, height })
 }
 
-fn milliseconds(text: &str) -> Result<f64, String> {
+pub(super) fn milliseconds(text: &str) -> Result<f64, String> {
     not_negative(text).ok_or_else(|| "a budget is a number of milliseconds, 0 or more".to_owned())
 }
 
@@ -259,7 +265,7 @@ fn not_negative(text: &str) -> Option<f64> {
     (value.is_finite() && value >= 0.0).then_some(value)
 }
 
-fn count(text: &str) -> Result<u32, String> {
+pub(super) fn count(text: &str) -> Result<u32, String> {
     match text.parse() {
         Ok(0) | Err(_) => Err(format!("it must be a whole number from 1 to {}", u32::MAX)),
         Ok(count) => Ok(count),

@@ -4,7 +4,9 @@
 //! Exit status: 0 done; 1 the program failed (input and output, machine); 2 bad usage or bad input.
 
 mod args;
+mod bench;
 mod console;
+mod inspect;
 mod machine;
 mod render;
 mod sweep;
@@ -85,6 +87,8 @@ pub(crate) fn main() -> ExitCode {
     let result = match &arguments.command {
         args::Command::Render(render) => render::run(render),
         args::Command::Sweep(sweep) => sweep::run(sweep),
+        args::Command::Bench(bench) => bench::run(bench),
+        args::Command::Inspect(inspect) => inspect::run(inspect),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -58,7 +58,7 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
 }
 
 /// Other names would promise other formats.
-fn require_png(path: &Path) -> Result<(), Failure> {
+pub(super) fn require_png(path: &Path) -> Result<(), Failure> {
     let is_png = path
         .extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
@@ -87,7 +87,7 @@ fn compare(
 }
 
 /// What a counter of skipped things is called on the screen.
-fn label(name: &str) -> String {
+pub(super) fn label(name: &str) -> String {
     match name {
         "triangles_off_screen" => "triangles off screen or between pixels".to_owned(),
         _ => name.replace('_', " "),
@@ -230,7 +230,7 @@ impl FrameReport {
 }
 
 /// Names and milliseconds of the stages.
-fn stages(stages: &StageTimes) -> [(&'static str, f64); 6] {
+pub(super) fn stages(stages: &StageTimes) -> [(&'static str, f64); 6] {
     let StageTimes {
         cull,
         shade,
@@ -269,6 +269,6 @@ fn measured(error: &ErrorReport) -> String {
     )
 }
 
-fn list(items: impl IntoIterator<Item = String>) -> String {
+pub(super) fn list(items: impl IntoIterator<Item = String>) -> String {
     items.into_iter().collect::<Vec<_>>().join(", ")
 }

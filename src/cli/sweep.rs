@@ -49,7 +49,7 @@ pub(super) fn run(args: &Arguments) -> Result<(), Failure> {
 }
 
 /// What rows call a scene: the file's name without directories and ending.
-fn name_of(path: &Path) -> String {
+pub(super) fn name_of(path: &Path) -> String {
     path.file_stem()
         .map_or_else(|| path.to_string_lossy(), |stem| stem.to_string_lossy())
         .into_owned()

@@ -140,11 +140,11 @@ impl Inspection {
     #[must_use]
     pub fn new(engine: &Engine, scene: &Scene, stats: &FrameStats, size: [u32; 2]) -> Self {
         let world = engine.world();
-        let view = world.view(&scene.camera, size[0], size[1]);
+        let view = world.view(scene.camera(), size[0], size[1]);
         let mut leaves = LeafCounts::new(world);
         engine.for_each_leaf(|leaf| leaves.add(world, &view, leaf));
         Self {
-            objects: scene.objects.len(),
+            objects: scene.objects().len(),
             vertices: world.positions.len(),
             triangles: triangles(stats),
             clusters: clusters(world, stats),

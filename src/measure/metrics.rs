@@ -67,18 +67,8 @@ impl ErrorReport {
 
     /// [`compare`](Self::compare) of images that are known to have the same size.
     pub(super) fn of_same_size(frame: &Frame, reference: &ReferenceImage) -> Self {
-        debug_assert_eq!(frame.pixels().len(), reference.pixels.len(), "sizes differ");
         let mut histogram = ErrorHistogram::default();
-        for (index, &[r, g, b, _]) in frame.pixels().iter().enumerate() {
-            if !reference.is_covered(index) {
-                continue;
-            }
-            if reference.grazing[index] {
-                histogram.exclude();
-            } else {
-                histogram.add([r, g, b], reference.pixels[index]);
-            }
-        }
+        histogram.add_image(frame, reference);
         histogram.report()
     }
 }
@@ -104,6 +94,21 @@ impl Default for ErrorHistogram {
 }
 
 impl ErrorHistogram {
+    /// Adds all pixels of an image of the reference's size that the scene covers.
+    pub(super) fn add_image(&mut self, frame: &Frame, reference: &ReferenceImage) {
+        debug_assert_eq!(frame.pixels().len(), reference.pixels.len(), "sizes differ");
+        for (index, &[r, g, b, _]) in frame.pixels().iter().enumerate() {
+            if !reference.is_covered(index) {
+                continue;
+            }
+            if reference.grazing[index] {
+                self.exclude();
+            } else {
+                self.add([r, g, b], reference.pixels[index]);
+            }
+        }
+    }
+
     /// Adds a covered pixel.
     pub fn add(&mut self, image: [u8; 3], reference: [u8; 3]) {
         let differences: [u8; 3] = std::array::from_fn(|c| image[c].abs_diff(reference[c]));

@@ -1,11 +1,14 @@
-//! Measuring images: the Phong reference, error metrics, sweeps of error against time, and looking into an image.
+//! Measuring images: the Phong reference, error metrics, frame times around a scene, sweeps of error
+//! against time, and looking into an image.
 
+pub mod bench;
 pub mod inspection;
 pub mod metrics;
 pub mod overlay;
 pub mod reference;
 pub mod sweep;
 
+pub use bench::{BenchOptions, BenchPhase, BenchReport, bench};
 pub use inspection::Inspection;
 pub use metrics::{ErrorHistogram, ErrorReport, SizeMismatch};
 pub use overlay::{Layer, draw_overlay};

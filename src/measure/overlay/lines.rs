@@ -1,7 +1,7 @@
 //! Lines on surfaces: clipped, each drawn once, hidden where the surface is.
 //!
 //! An edge is cut into steps of about [`STEP_PX`]; a step is drawn when one of the triangles that the edge belongs to owns one of
-//! the 3 x 3 pixels about the step's middle.
+//! the four pixels whose centres are next to the step's middle.
 
 use super::{Picture, colour};
 use crate::geometry::bary::Bary;
@@ -21,7 +21,7 @@ const MARGIN_PX: f64 = 4.0;
 
 /// The size (square root of area, in pixels) of polygons whose edges are not drawn at all, and of those whose edges are
 /// drawn in full.
-const FADE_PX: [f64; 2] = [2.5, 10.0];
+const FADE_PX: [f64; 2] = [2.5, 14.0];
 
 /// Opacities are rounded to so many steps, each drawn as one path.
 const OPACITIES: usize = 12;
@@ -158,7 +158,7 @@ impl<'a> Lines<'a> {
                 if let Some(path) = path.finish() {
                     let stroke = Stroke {
                         width: pen.width * scale,
-                        line_cap: LineCap::Round,
+                        line_cap: LineCap::Butt,
                         ..Stroke::default()
                     };
                     let mut paint = Paint::default();
@@ -197,10 +197,11 @@ impl<'a> Lines<'a> {
             self.picture.view.width as i32,
             self.picture.view.height as i32,
         );
-        let (x, y) = (x.floor() as i32, y.floor() as i32);
-        let rows = (y - 1).max(0)..(y + 2).min(height);
+        // Of these four the point is within one pixel's width.
+        let (x, y) = ((x - 0.5).floor() as i32, (y - 0.5).floor() as i32);
+        let rows = y.max(0)..(y + 2).min(height);
         rows.into_iter().any(|y| {
-            let columns = (x - 1).max(0)..(x + 2).min(width);
+            let columns = x.max(0)..(x + 2).min(width);
             columns.into_iter().any(|x| {
                 let id = self.picture.ids[y as usize * width as usize + x as usize];
                 edge.owners.contains(&id)

@@ -108,7 +108,7 @@ pub fn draw_overlay(frame: &mut Frame, engine: &Engine, scene: &Scene, layers: &
         return;
     };
     let world = engine.world();
-    let view = world.view(&scene.camera, width, height);
+    let view = world.view(scene.camera(), width, height);
     let picture = Picture::new(engine, &view);
     let shows = |layer| layers.contains(&layer);
 
