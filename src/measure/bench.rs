@@ -484,7 +484,7 @@ mod tests {
         let mut options = BenchOptions {
             budget: Budget::from_millis(2.0),
             compared_views: 0,
-            clock: Arc::new(ManualClock::new()),
+            clock: Arc::new(ManualClock::default()),
             repeats: 3,
             ..options(Method::Gouraud, 2)
         };
