@@ -193,6 +193,7 @@ pub fn bench(
             threads: options.threads,
             simd: options.simd,
             clock: Arc::clone(&options.clock),
+            ..EngineOptions::default()
         },
     )?;
     let mut turntable = Turntable {
