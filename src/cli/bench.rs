@@ -17,14 +17,15 @@ const MOST: u32 = 3600;
 /// `specula bench`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-This is the experiment of Cho, Neumann and Woo, section 4: the camera turns about the scene's target around
-its up vector, in equal steps, and each view is rendered from cold. A first turn warms up and does not count.
-Without --budget and --work each frame is rendered until it is final: adaptive shading until it equals
-per-pixel Phong shading.
+This is the experiment of Cho, Neumann and Woo, section 4: the camera turns about the scene's
+target around its up vector, in equal steps, and each view is rendered from cold. A first turn
+warms up and does not count. Without --budget and --work each frame is rendered until it is final:
+with adaptive shading until it equals per-pixel Phong shading.
 
-Median and p99 are by nearest rank; times of stages and numbers of triangles are means. The error is that
-of --error views, rendered once more after all times have been taken, against the Phong reference, which takes
-about a second each.
+Median and p99 are by nearest rank: the p99 of fewer than 100 frames is the longest. Times of
+stages and numbers of triangles are means. The error is that of --error views, rendered once more
+after all times have been taken; the Phong reference of one takes from a tenth of a second to many,
+depending on its size and the number of lights.
 
 Examples:
   The paper's experiment:

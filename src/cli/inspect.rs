@@ -32,8 +32,8 @@ Colours of the overlay, and the layers they belong to:
              squares: where directional light comes from
 Lines fade out where triangles are smaller than a few pixels.
 
-Without --budget and --work the image is refined until it equals per-pixel Phong shading; --work 0 shows
-the first, Gouraud-shaded image.
+Without --budget and --work the image is refined until it equals per-pixel Phong shading; with
+--work 0 it is the first, Gouraud-shaded one.
 
 Examples:
   What is there to see, and what was left out:

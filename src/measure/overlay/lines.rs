@@ -42,7 +42,7 @@ const PENS: usize = 4;
 impl Pen {
     pub(super) const LEAF: Self = Self {
         colour: [150, 225, 255],
-        alpha: 0.55,
+        alpha: 0.48,
         width: 0.7,
         priority: 0,
     };
