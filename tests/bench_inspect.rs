@@ -345,6 +345,26 @@ fn what_is_hidden_is_not_drawn() {
         visible.len() > alone.len() + 200,
         "the sphere above is there"
     );
+
+    // Larger than the plate, and turned: its edges end where the plate begins.
+    let larger = ", (shape: Plane(width: 2.6, depth: 2.6, columns: 1, rows: 1), \
+        position: (0, 0, -2), rotate_degrees: (0, 0, 15))";
+    let partly_hidden = wires(larger);
+    let inside = |wires: &[usize]| -> Vec<usize> {
+        let is_inside = |index: &usize| {
+            let (x, y) = (index % 200, index / 200);
+            (53..147).contains(&x) && (28..122).contains(&y)
+        };
+        wires.iter().copied().filter(is_inside).collect()
+    };
+    assert!(
+        inside(&alone) == inside(&partly_hidden),
+        "its diagonal shows through"
+    );
+    assert!(
+        partly_hidden.len() > alone.len() + 200,
+        "its border is there"
+    );
 }
 
 #[test]

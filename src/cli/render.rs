@@ -230,7 +230,7 @@ impl FrameReport {
 }
 
 /// Names and milliseconds of the stages.
-pub(super) fn stages(stages: &StageTimes) -> [(&'static str, f64); 6] {
+fn stages(stages: &StageTimes) -> [(&'static str, f64); 6] {
     let StageTimes {
         cull,
         shade,

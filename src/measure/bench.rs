@@ -411,6 +411,7 @@ mod tests {
         let found = [0, 1, 50, 99, 100].map(|percent| quantile(&times, percent));
         assert_eq!(found, [1.0, 2.0, 100.0, 198.0, 200.0]);
         assert_eq!(quantile(&[1.0, 2.0, 3.0, 4.0], 50), 2.0, "the lower median");
+        assert_eq!(quantile(&[1.0, 2.0, 3.0], 50), 2.0);
         assert_eq!(quantile(&[7.0], 99), 7.0);
         assert_eq!(quantile(&[], 50), 0.0);
     }
