@@ -22,6 +22,8 @@ Examples:
   specula render scenes/teapot.ron -o teapot.png
   specula render scenes/teapot.ron -o teapot.png --budget 2 --frames 8
   specula sweep scenes/teapot.ron --methods all --csv teapot.csv
+  specula bench scenes/teapot.ron --budget 4
+  specula inspect scenes/teapot.ron --budget 2 --overlay overlay.png
 
 Exit status: 0 done, 1 failed (also: a file cannot be read or written), 2 bad usage or bad input.")]
 pub(super) struct Arguments {

@@ -69,7 +69,7 @@ impl Default for BenchOptions {
 }
 
 impl BenchOptions {
-    /// How many frames [`bench`] renders for what.
+    /// How many frames [`bench()`] renders for what.
     #[must_use]
     pub fn steps(&self, phase: BenchPhase) -> u64 {
         let views = u64::from(self.views.max(1));

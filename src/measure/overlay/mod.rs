@@ -1,7 +1,7 @@
 //! What an image consists of, drawn over it: triangles, potentially highlighted ones, refinement, lights.
 //!
 //! The image is dimmed, areas are tinted pixel by pixel, and lines are drawn on top, anti-aliased. Nothing hidden is
-//! shown: a tint colours only pixels that the triangle owns, and a [line](lines) is drawn where one of the triangles it
+//! shown: a tint colours only pixels that the triangle owns, and a line is drawn where one of the triangles it
 //! belongs to owns a pixel next to it. Lines fade out where the mesh is finer than a few pixels, so that a dense mesh stays an
 //! image; tints do not.
 //!
