@@ -52,6 +52,21 @@ pub fn unit(v: DVec3) -> Option<DVec3> {
     Some((v / largest).normalize())
 }
 
+/// Sine and cosine of an angle in degrees, exact at right angles, the same on every machine.
+#[must_use]
+pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+    let turned = libm::fmod(degrees, 360.0);
+    let quarter = libm::round(turned / 90.0);
+    let rest = (turned - quarter * 90.0).to_radians();
+    let (s, c) = (libm::sin(rest), libm::cos(rest));
+    match (quarter as i32).rem_euclid(4) {
+        0 => (s, c),
+        1 => (c, -s),
+        2 => (-s, -c),
+        _ => (-c, s),
+    }
+}
+
 /// An axis-aligned box in author or world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {

@@ -1,10 +1,15 @@
 //! Framebuffers, encodings and image files.
 
+pub mod apng;
 pub mod encode;
 pub mod frame;
 pub mod png;
+pub mod sequence;
 pub mod target;
+pub mod timing;
+pub mod y4m;
 
 pub use frame::Frame;
 pub use png::SaveError;
 pub use target::{ChannelOrder, Target, TargetError};
+pub use timing::{FrameRate, Timing};

@@ -51,13 +51,7 @@ impl Frame {
         let path = path.as_ref();
         let (scratch, file) = Scratch::beside(path)?;
         let mut writer = BufWriter::new(file);
-        encode(self, &mut writer).map_err(|error| match error {
-            png::EncodingError::IoError(error) => io_error(path, error),
-            other => SaveError::Encode {
-                path: path.to_owned(),
-                reason: other.to_string(),
-            },
-        })?;
+        encode(self, &mut writer).map_err(|error| encode_error(path, error))?;
         // Dropping the writer would swallow the error of its last write.
         writer.flush().map_err(|error| io_error(path, error))?;
         drop(writer);
@@ -78,10 +72,20 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<(), SaveError> {
     Scratch::beside(path).map(drop)
 }
 
-fn io_error(path: &Path, error: io::Error) -> SaveError {
+pub(super) fn io_error(path: &Path, error: io::Error) -> SaveError {
     SaveError::Io {
         path: path.to_owned(),
         error,
+    }
+}
+
+pub(super) fn encode_error(path: &Path, error: png::EncodingError) -> SaveError {
+    match error {
+        png::EncodingError::IoError(error) => io_error(path, error),
+        other => SaveError::Encode {
+            path: path.to_owned(),
+            reason: other.to_string(),
+        },
     }
 }
 
@@ -114,14 +118,14 @@ fn encode(frame: &Frame, writer: impl Write) -> Result<(), png::EncodingError> {
 
 /// A file that is removed again unless it is renamed.
 #[derive(Debug)]
-struct Scratch {
+pub(super) struct Scratch {
     path: PathBuf,
     keep: bool,
 }
 
 impl Scratch {
     /// A new file in the directory of `path`.
-    fn beside(path: &Path) -> Result<(Self, File), SaveError> {
+    pub(super) fn beside(path: &Path) -> Result<(Self, File), SaveError> {
         /// Tells apart the files of threads that write to the same destination at once.
         static SERIAL: AtomicU64 = AtomicU64::new(0);
         let Some(name) = path.file_name() else {
@@ -148,7 +152,7 @@ impl Scratch {
     }
 
     /// Gives the file its final name, in place of whatever had it.
-    fn rename_to(mut self, path: &Path) -> Result<(), SaveError> {
+    pub(super) fn rename_to(mut self, path: &Path) -> Result<(), SaveError> {
         fs::rename(&self.path, path).map_err(|error| io_error(path, error))?;
         self.keep = true;
         Ok(())

@@ -34,6 +34,7 @@
 //! # Ok::<(), specula::scene::SceneError>(())
 //! ```
 
+pub mod animation;
 mod defaults;
 mod edit;
 mod error;
@@ -49,6 +50,7 @@ mod syntax;
 pub mod view;
 pub mod world;
 
+pub use animation::Animation;
 pub use edit::Revisions;
 pub use error::SceneError;
 pub use mesh_file::{MeshUp, load_mesh};
@@ -81,6 +83,7 @@ pub struct Scene {
     objects: Vec<Object>,
     /// Where each object was when it came into the scene.
     rest: Vec<DMat4>,
+    animation: Option<Animation>,
     revisions: Revisions,
 }
 
@@ -130,6 +133,7 @@ impl Scene {
             materials,
             rest: places(&objects),
             objects,
+            animation: None,
             revisions: Revisions::fresh(),
         }
     }

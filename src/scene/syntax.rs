@@ -15,6 +15,7 @@ pub(super) struct SceneEntry<'a> {
     #[serde(default)]
     pub(super) materials: Named<'a>,
     pub(super) objects: Option<Raw<'a>>,
+    pub(super) animation: Option<Raw<'a>>,
 }
 
 /// Values by name, in the file's order, which a hash map would lose.
@@ -73,11 +74,13 @@ pub(super) enum LightEntry<'a> {
         position: Raw<'a>,
         color: Option<Raw<'a>>,
         intensity: Option<Raw<'a>>,
+        orbit: Option<Raw<'a>>,
     },
     Directional {
         direction: Raw<'a>,
         color: Option<Raw<'a>>,
         intensity: Option<Raw<'a>>,
+        orbit: Option<Raw<'a>>,
     },
 }
 
@@ -117,6 +120,29 @@ pub(super) struct ObjectEntry<'a> {
     pub(super) position: Option<Raw<'a>>,
     pub(super) rotate_degrees: Option<Raw<'a>>,
     pub(super) scale: Option<Raw<'a>>,
+    pub(super) spin: Option<Raw<'a>>,
+}
+
+/// `animation:`
+#[derive(Debug, serde::Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    rename = "Animation",
+    bound(deserialize = "'de: 'a")
+)]
+pub(super) struct AnimationEntry<'a> {
+    pub(super) duration: Option<Raw<'a>>,
+    pub(super) fps: Option<Raw<'a>>,
+    pub(super) orbit: Option<Raw<'a>>,
+}
+
+/// `orbit:` and `spin:`
+#[derive(Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields, rename = "Turn", bound(deserialize = "'de: 'a"))]
+pub(super) struct TurnEntry<'a> {
+    pub(super) degrees_per_second: Option<Raw<'a>>,
+    pub(super) axis: Option<Raw<'a>>,
+    pub(super) center: Option<Raw<'a>>,
 }
 
 /// `normals:` of an object.

@@ -8,9 +8,11 @@ use super::{
     Camera, Extent, Light, LightKind, Material, ReflectionModel, Revisions, Rgb, Scene, defaults,
     places,
 };
+use animation::Motions;
 use std::collections::HashMap;
 use std::fmt::Display;
 
+mod animation;
 mod camera;
 mod objects;
 
@@ -25,9 +27,10 @@ pub(super) fn scene(source: &Source<'_>) -> Result<Scene, SceneError> {
     }
     let entry: SceneEntry<'_> = source.parse(whole)?;
     let mut materials = Materials::read(source, &entry.materials)?;
-    let objects = objects::objects(source, entry.objects, &mut materials)?;
+    let mut motions = Motions::default();
+    let objects = objects::objects(source, entry.objects, &mut materials, &mut motions)?;
     let extent = Extent::of(&objects);
-    Ok(Scene {
+    let mut scene = Scene {
         camera: match entry.camera {
             Some(raw) => camera::camera(source, raw, &extent)?,
             None => Camera::fitted(&extent),
@@ -35,14 +38,17 @@ pub(super) fn scene(source: &Source<'_>) -> Result<Scene, SceneError> {
         background: color(source, entry.background, "background", defaults::BACKGROUND)?,
         ambient: color(source, entry.ambient, "ambient", defaults::AMBIENT)?,
         lights: match entry.lights {
-            Some(entries) => lights(source, &entries)?,
+            Some(entries) => lights(source, &entries, &mut motions)?,
             None => defaults::lights(&extent),
         },
         materials: materials.list,
         rest: places(&objects),
         objects,
+        animation: None,
         revisions: Revisions::fresh(),
-    })
+    };
+    scene.animation = animation::animation(source, entry.animation, &motions, &scene, &extent)?;
+    Ok(scene)
 }
 
 /// An optional colour.
@@ -165,7 +171,11 @@ fn material(source: &Source<'_>, raw: Raw<'_>, name: &str) -> Result<Material, S
     })
 }
 
-fn lights(source: &Source<'_>, entries: &[Raw<'_>]) -> Result<Vec<Light>, SceneError> {
+fn lights<'a>(
+    source: &Source<'a>,
+    entries: &[Raw<'a>],
+    motions: &mut Motions<'a>,
+) -> Result<Vec<Light>, SceneError> {
     if let Some(&one_too_many) = entries.get(MAX_LIGHTS) {
         return Err(source.error(
             one_too_many,
@@ -178,30 +188,43 @@ fn lights(source: &Source<'_>, entries: &[Raw<'_>]) -> Result<Vec<Light>, SceneE
     entries
         .iter()
         .enumerate()
-        .map(|(index, &raw)| light(source, raw, index))
+        .map(|(index, &raw)| light(source, raw, index, motions))
         .collect()
 }
 
-fn light(source: &Source<'_>, raw: Raw<'_>, index: usize) -> Result<Light, SceneError> {
+fn light<'a>(
+    source: &Source<'a>,
+    raw: Raw<'a>,
+    index: usize,
+    motions: &mut Motions<'a>,
+) -> Result<Light, SceneError> {
     let field = |raw, name: &str| source.field(raw, format_args!("lights[{index}].{name}"));
-    let (kind, tint, intensity) = match source.parse(raw)? {
+    let (kind, tint, intensity, orbit) = match source.parse(raw)? {
         LightEntry::Point {
             position,
             color,
             intensity,
+            orbit,
         } => {
             let position = field(position, "position").vector()?;
-            (LightKind::Point { position }, color, intensity)
+            (LightKind::Point { position }, color, intensity, orbit)
         }
         LightEntry::Directional {
             direction,
             color,
             intensity,
+            orbit,
         } => {
             let direction = field(direction, "direction").direction()?;
-            (LightKind::Directional { direction }, color, intensity)
+            (
+                LightKind::Directional { direction },
+                color,
+                intensity,
+                orbit,
+            )
         }
     };
+    motions.lights.extend(orbit.map(|raw| (index, raw)));
     let tint = tint.map_or(Ok([1.0; 3]), |raw| field(raw, "color").color())?;
     let intensity = intensity.map_or(Ok(1.0), |raw| field(raw, "intensity").up_to(MAX_COLOR))?;
     Ok(Light {

@@ -8,9 +8,11 @@ use super::super::shape::Shape;
 use super::super::source::{Field, Raw, Source};
 use super::super::syntax::{NormalsEntry, ObjectEntry, ShapeEntry, UpEntry, WeightEntry};
 use super::Materials;
+use super::animation::Motions;
 use crate::geometry::Mesh;
 use crate::geometry::import::Normals;
 use crate::geometry::normals::{CREASE_DEGREES, Weight};
+use crate::math::sin_cos_degrees;
 use glam::{DMat3, DMat4, DVec3};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -18,12 +20,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Reads the objects, of which there is at least one.
-pub(super) fn objects(
-    source: &Source<'_>,
-    raw: Option<Raw<'_>>,
+pub(super) fn objects<'a>(
+    source: &Source<'a>,
+    raw: Option<Raw<'a>>,
     materials: &mut Materials,
+    motions: &mut Motions<'a>,
 ) -> Result<Vec<Object>, SceneError> {
-    let entries: Vec<Raw<'_>> = raw.map_or_else(|| Ok(Vec::new()), |raw| source.parse(raw))?;
+    let entries: Vec<Raw<'a>> = raw.map_or_else(|| Ok(Vec::new()), |raw| source.parse(raw))?;
     if entries.is_empty() {
         return Err(source.error(
             raw.unwrap_or(source.whole()),
@@ -34,7 +37,8 @@ pub(super) fn objects(
     let mut planned = Vec::with_capacity(entries.len());
     let mut triangles = 0_u64;
     for (index, &raw) in entries.iter().enumerate() {
-        let entry: ObjectEntry<'_> = source.parse(raw)?;
+        let entry: ObjectEntry<'a> = source.parse(raw)?;
+        motions.objects.extend(entry.spin.map(|raw| (index, raw)));
         let at = format!("objects[{index}]");
         let (geometry, size) = geometry(source, raw, &entry, &at, &mut meshes)?;
         triangles += geometry.triangles();
@@ -305,18 +309,4 @@ fn rotation(degrees: DVec3) -> DMat3 {
     let y = DMat3::from_cols(DVec3::new(cy, 0.0, -sy), DVec3::Y, DVec3::new(sy, 0.0, cy));
     let z = DMat3::from_cols(DVec3::new(cz, sz, 0.0), DVec3::new(-sz, cz, 0.0), DVec3::Z);
     z * y * x
-}
-
-/// Sine and cosine of an angle in degrees, exact at right angles, the same on every machine.
-fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
-    let turned = libm::fmod(degrees, 360.0);
-    let quarter = libm::round(turned / 90.0);
-    let rest = (turned - quarter * 90.0).to_radians();
-    let (s, c) = (libm::sin(rest), libm::cos(rest));
-    match (quarter as i32).rem_euclid(4) {
-        0 => (s, c),
-        1 => (c, -s),
-        2 => (-s, -c),
-        _ => (-c, s),
-    }
 }
