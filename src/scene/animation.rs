@@ -202,25 +202,17 @@ impl Scene {
             return;
         };
         if let Some((rest, turn)) = &animation.camera {
-            let camera = turn.after(seconds).camera(rest);
-            if self.camera != camera {
-                self.camera = camera;
-                self.touch();
-            }
+            self.set_camera(turn.after(seconds).camera(rest));
         }
         for (index, rest, turn) in &animation.lights {
-            let light = turn.after(seconds).light(rest);
-            if self.lights.get(*index).is_some_and(|old| *old != light) {
-                self.lights[*index] = light;
-                self.touch();
+            // There may be fewer lights or objects by now.
+            if *index < self.lights.len() {
+                self.set_light(*index, turn.after(seconds).light(rest));
             }
         }
         for (index, rest, turn) in &animation.objects {
-            let place = turn.after(seconds).transform(rest);
-            let moved = |object: &super::Object| object.author_from_mesh != place;
-            if self.objects.get(*index).is_some_and(moved) {
-                self.objects[*index].author_from_mesh = place;
-                self.touch();
+            if *index < self.objects.len() {
+                self.set_transform(*index, turn.after(seconds).transform(rest));
             }
         }
         self.animation = Some(animation);
