@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+use super::animate::{Animate, time};
 use super::bench::Bench;
 use super::inspect::Inspect;
 use clap::{Args, Parser, Subcommand};
@@ -21,6 +22,7 @@ const MAX_THREADS: usize = 1024;
 Examples:
   specula render scenes/teapot.ron -o teapot.png
   specula render scenes/teapot.ron -o teapot.png --budget 2 --frames 8
+  specula animate scenes/turntable.ron -o turntable.apng --budget 4
   specula sweep scenes/teapot.ron --methods all --csv teapot.csv
   specula bench scenes/teapot.ron --budget 4
   specula inspect scenes/teapot.ron --budget 2 --overlay overlay.png
@@ -36,6 +38,8 @@ pub(super) struct Arguments {
 pub(super) enum Command {
     /// Render frames of a still view under a budget, and write the last one
     Render(Render),
+    /// Render the scene's animation, each frame under a budget, as APNG, Y4M or numbered PNG files
+    Animate(Animate),
     /// Measure error against time: methods x budgets, every row from a cold engine
     Sweep(Sweep),
     /// Measure frame times over views from all around a scene
@@ -77,6 +81,10 @@ pub(super) struct Render {
     /// speed or the number of threads
     #[arg(long, value_name = "UNITS", conflicts_with = "budget")]
     pub(super) work: Option<u64>,
+
+    /// Show the scene's animation after this many seconds, as `specula animate` films it
+    #[arg(long, value_name = "S", value_parser = time, allow_negative_numbers = true)]
+    pub(super) time: Option<f64>,
 
     /// How many frames of the view to render
     #[arg(long, value_name = "N", default_value = "1", value_parser = count)]

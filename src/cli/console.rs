@@ -55,15 +55,27 @@ pub(super) struct Progress {
 impl Progress {
     /// `steps` of zero: as many as there will be.
     pub(super) fn new(steps: u64) -> Self {
-        let bar = if io::stderr().is_terminal() {
-            ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr())
-        } else {
-            ProgressBar::hidden()
-        };
         let template = if steps > 0 {
             "{msg} {wide_bar} {pos}/{len} {eta}"
         } else {
             "{spinner} {msg}"
+        };
+        Self::with_template(steps, template)
+    }
+
+    /// For the frames of a film: with frames per second and the time that remains. Nothing runs in the background.
+    pub(super) fn frames(count: u64) -> Self {
+        Self::with_template(
+            count,
+            "{wide_bar} frame {pos}/{len}, {per_sec}, {eta} to go",
+        )
+    }
+
+    fn with_template(steps: u64, template: &str) -> Self {
+        let bar = if io::stderr().is_terminal() {
+            ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr())
+        } else {
+            ProgressBar::hidden()
         };
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);

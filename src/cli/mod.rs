@@ -3,6 +3,7 @@
 //!
 //! Exit status: 0 done; 1 the program failed (input and output, machine); 2 bad usage or bad input.
 
+mod animate;
 mod args;
 mod bench;
 mod console;
@@ -86,6 +87,7 @@ pub(crate) fn main() -> ExitCode {
     };
     let result = match &arguments.command {
         args::Command::Render(render) => render::run(render),
+        args::Command::Animate(animate) => animate::run(animate),
         args::Command::Sweep(sweep) => sweep::run(sweep),
         args::Command::Bench(bench) => bench::run(bench),
         args::Command::Inspect(inspect) => inspect::run(inspect),

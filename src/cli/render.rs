@@ -1,8 +1,8 @@
 //! `specula render`: frames of a still view under a budget.
 
-use super::Failure;
 use super::args::Render;
 use super::console::{Output, Progress, note};
+use super::{Failure, animate};
 use serde_json::{Map, Value, json};
 use specula::frame::{Engine, EngineOptions, FrameStats, StageTimes};
 use specula::measure::{ErrorReport, ReferenceImage};
@@ -14,7 +14,10 @@ use std::path::Path;
 pub(super) fn run(args: &Render) -> Result<(), Failure> {
     require_png(&args.output)?;
     png::check_writable(&args.output)?;
-    let scene = Scene::load(&args.scene)?;
+    let mut scene = Scene::load(&args.scene)?;
+    if let Some(seconds) = args.time {
+        animate::go_to_time(&mut scene, seconds);
+    }
     let options = EngineOptions {
         method: args.method,
         threads: args.machine.threads,
@@ -104,48 +107,52 @@ struct FrameReport {
     error: Option<ErrorReport>,
 }
 
+/// The statistics of a frame as one object; what it does not have is null.
+pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
+    let (budget_ms, budget_work) = match stats.budget {
+        Budget::Millis(ms) => (Some(ms), None),
+        Budget::Work(units) => (None, Some(units)),
+        Budget::Unlimited => (None, None),
+    };
+    let stages: Map<String, Value> = stages(&stats.stage_ms)
+        .into_iter()
+        .map(|(name, ms)| (name.to_owned(), json!(ms)))
+        .collect();
+    let skipped: Map<String, Value> = stats
+        .skipped
+        .entries()
+        .into_iter()
+        .map(|(name, count)| (name.to_owned(), json!(count)))
+        .collect();
+    json!({
+        "frame": number,
+        "frame_ms": stats.frame_ms,
+        "budget_ms": budget_ms,
+        "budget_work": budget_work,
+        "overshoot_ms": stats.overshoot_ms(),
+        "outcome": stats.outcome.name(),
+        "converged": stats.converged,
+        "estimated_error": stats.estimated_error,
+        "triangles": stats.triangles,
+        "triangles_drawn": stats.triangles_drawn,
+        "triangles_visible": stats.triangles_visible,
+        "pht": stats.pht,
+        "pht_visible": stats.pht_visible,
+        "refined": stats.refined,
+        "triangles_subdivided": stats.triangles_subdivided,
+        "leaves": stats.leaves,
+        "phong_pixels": stats.phong_pixels,
+        "work_units": stats.work_units,
+        "pixels_written": stats.pixels_written,
+        "stage_ms": stages,
+        "skipped": skipped,
+    })
+}
+
 impl FrameReport {
-    /// One object; what a frame does not have is null.
+    /// One object.
     fn json(&self) -> Value {
-        let stats = &self.stats;
-        let (budget_ms, budget_work) = match stats.budget {
-            Budget::Millis(ms) => (Some(ms), None),
-            Budget::Work(units) => (None, Some(units)),
-            Budget::Unlimited => (None, None),
-        };
-        let stages: Map<String, Value> = stages(&stats.stage_ms)
-            .into_iter()
-            .map(|(name, ms)| (name.to_owned(), json!(ms)))
-            .collect();
-        let skipped: Map<String, Value> = stats
-            .skipped
-            .entries()
-            .into_iter()
-            .map(|(name, count)| (name.to_owned(), json!(count)))
-            .collect();
-        let mut object = json!({
-            "frame": self.number,
-            "frame_ms": stats.frame_ms,
-            "budget_ms": budget_ms,
-            "budget_work": budget_work,
-            "overshoot_ms": stats.overshoot_ms(),
-            "outcome": stats.outcome.name(),
-            "converged": stats.converged,
-            "estimated_error": stats.estimated_error,
-            "triangles": stats.triangles,
-            "triangles_drawn": stats.triangles_drawn,
-            "triangles_visible": stats.triangles_visible,
-            "pht": stats.pht,
-            "pht_visible": stats.pht_visible,
-            "refined": stats.refined,
-            "triangles_subdivided": stats.triangles_subdivided,
-            "leaves": stats.leaves,
-            "phong_pixels": stats.phong_pixels,
-            "work_units": stats.work_units,
-            "pixels_written": stats.pixels_written,
-            "stage_ms": stages,
-            "skipped": skipped,
-        });
+        let mut object = frame_json(self.number, &self.stats);
         if let (Some(error), Some(object)) = (self.error, object.as_object_mut()) {
             object.insert("error".to_owned(), json!(error));
         }
