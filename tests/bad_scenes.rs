@@ -15,6 +15,34 @@ const EXPECTED: &[(&str, &str)] = &[
         "2:20: `ambient` must be a finite number, not NaN",
     ),
     (
+        "animation_duration_long",
+        "2:27: `animation.duration` must be at most 86400 seconds, but is 1e6",
+    ),
+    (
+        "animation_duration_zero",
+        "2:27: `animation.duration` must be above 0, but is 0",
+    ),
+    (
+        "animation_fps_text",
+        r#"2:22: `animation.fps` must be a number, not "film""#,
+    ),
+    (
+        "animation_fps_zero",
+        "2:35: `animation.fps` must be from 0.001 to 1000, but is 0",
+    ),
+    (
+        "animation_number",
+        "2:16: fields in parentheses `(name: value, ..)` are needed here",
+    ),
+    (
+        "animation_too_many_frames",
+        "4:19: `animation` is too long: 86400 seconds at 60 frames a second are 5184000 frames; at most 1000000 are possible",
+    ),
+    (
+        "animation_unknown_field",
+        "2:17: unknown field `seconds` of `Animation`; the fields are `duration`, `fps` and `orbit`",
+    ),
+    (
         "background_negative",
         "2:21: `background` must not be negative, but is -0.5",
     ),
@@ -130,6 +158,14 @@ const EXPECTED: &[(&str, &str)] = &[
     (
         "light_missing_position",
         "4:27: the field `position` of `Point` is missing",
+    ),
+    (
+        "light_orbit_axis_text",
+        r#"2:55: `lights[0].orbit.axis` must be three numbers (x, y, z), not "z""#,
+    ),
+    (
+        "light_orbit_no_center",
+        "3:77: `lights[0].orbit.center` has no meaning for a directional light, which has no place",
     ),
     (
         "light_position_nan",
@@ -257,11 +293,24 @@ const EXPECTED: &[(&str, &str)] = &[
     (
         "object_unknown_field",
         "4:27: unknown field `translate` of `Object`; the fields are `shape`, `mesh`, `normals`, `up`, `material`, `position`, `rotate_degrees` and `scale`",
+        "4:27: unknown field `translate` of `Object`; the fields are `shape`, `material`, `position`, `rotate_degrees`, `scale` and `spin`",
     ),
     ("objects_not_a_list", "2:14: a list `[..]` is needed here"),
     (
         "only_comment",
         "2:1: there is no scene here; the smallest is `(objects: [(shape: Teapot())])`",
+    ),
+    (
+        "orbit_axis_zero",
+        "3:23: `animation.orbit.axis` must not be the zero vector",
+    ),
+    (
+        "orbit_center_short",
+        "2:33: `animation.orbit.center` must be three numbers (x, y, z), not (0, 1)",
+    ),
+    (
+        "orbit_speed_nan",
+        "2:45: `animation.orbit.degrees_per_second` must be a finite number, not NaN",
     ),
     (
         "shape_bottom",
@@ -312,6 +361,18 @@ const EXPECTED: &[(&str, &str)] = &[
         "5:17: `objects[2].shape` brings the scene to 25003584 triangles; at most 16000000 are possible",
     ),
     (
+        "spin_number",
+        "2:38: fields in parentheses `(name: value, ..)` are needed here",
+    ),
+    (
+        "spin_speed_huge",
+        "4:53: `objects[1].spin.degrees_per_second` must be at most 36000 in magnitude, but is -1e5",
+    ),
+    (
+        "spin_unknown_field",
+        "2:39: unknown field `speed` of `Turn`; the fields are `degrees_per_second`, `axis` and `center`",
+    ),
+    (
         "too_many_lights",
         "131:9: `lights` has 129 entries; at most 128 are possible",
     ),
@@ -326,7 +387,7 @@ const EXPECTED: &[(&str, &str)] = &[
     ("unclosed_string", "3:9: a string is not closed"),
     (
         "unknown_field",
-        "2:5: unknown field `abmient` of `Scene`; the fields are `camera`, `background`, `ambient`, `lights`, `materials` and `objects`",
+        "2:5: unknown field `abmient` of `Scene`; the fields are `camera`, `background`, `ambient`, `lights`, `materials`, `objects` and `animation`",
     ),
     (
         "windows_lines_and_umlauts",

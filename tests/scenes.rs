@@ -26,6 +26,7 @@ const SCENES: &[(&str, usize, usize, bool)] = &[
     ),
     ("minimal", 3584, 2, true),
     ("teapot", 896, 4, true),
+    ("turntable", 896 + 32 * 12 * 2 + 128, 3, true),
     ("walls", 72 + 36 + 36, 6, false),
 ];
 
