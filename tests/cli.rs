@@ -68,6 +68,9 @@ fn bad_usage_and_bad_input_end_with_status_2_and_failures_with_1() {
     fs::create_dir(place.join("folder.png")).expect("writable");
     let before = files(place);
     let render = |rest: &[&'static str]| [&["render", "teapot.ron", "-o", "a.png"], rest].concat();
+    let animate = |output: &'static str, rest: &[&'static str]| {
+        [&["animate", "teapot.ron", "-o", output], rest].concat()
+    };
     for (arguments, status, message) in [
         (vec![], 2, "Usage"),
         (vec!["paint"], 2, "paint"),
@@ -91,6 +94,71 @@ fn bad_usage_and_bad_input_end_with_status_2_and_failures_with_1() {
         (render(&["--threads", "100000"]), 2, "1024"),
         (render(&["--method", "magic"]), 2, "phong-area"),
         (render(&["--simd", "mmx"]), 2, "scalar"),
+        (render(&["--time", "-1"]), 2, "seconds"),
+        (render(&["--time", "nan"]), 2, "seconds"),
+        (render(&["--time", "1e9"]), 2, "86400"),
+        (vec!["animate", "teapot.ron"], 2, "--output"),
+        (animate("a.apng", &["--fps", "0"]), 2, "30000/1001"),
+        (animate("a.apng", &["--fps", "-3"]), 2, "30000/1001"),
+        (animate("a.apng", &["--fps", "1/0"]), 2, "30000/1001"),
+        (animate("a.apng", &["--duration", "0"]), 2, "above 0"),
+        (animate("a.apng", &["--duration", "1e6"]), 2, "86400"),
+        (animate("a.apng", &["--budget", "-1"]), 2, "milliseconds"),
+        (
+            animate("a.apng", &["--work", "1", "--budget", "1"]),
+            2,
+            "cannot be used with",
+        ),
+        (
+            animate("a.apng", &["--duration", "80000", "--fps", "100"]),
+            2,
+            "error: 80000 seconds at 100 frames a second are 8000000 frames; at most 1000000",
+        ),
+        (animate("##.png", &["--shard", "0/4"]), 2, "from 1 to N"),
+        (animate("##.png", &["--shard", "5/4"]), 2, "from 1 to N"),
+        (animate("##.png", &["--shard", "3"]), 2, "from 1 to N"),
+        (
+            animate("a.apng", &["--shard", "1/4"]),
+            2,
+            "error: --shard needs numbered files such as frames/####.png",
+        ),
+        (animate("-", &["--shard", "1/4"]), 2, "error: --shard"),
+        (animate("-", &["--json"]), 2, "error: --json and the film"),
+        (
+            animate("a.mp4", &[]),
+            2,
+            "error: the output must be a .apng",
+        ),
+        (
+            animate("##.jpg", &[]),
+            2,
+            "error: the output must be a .apng",
+        ),
+        (
+            animate("##/##.png", &[]),
+            2,
+            "error: '##/##.png' has several",
+        ),
+        (
+            animate("##/a.png", &[]),
+            2,
+            "error: '##/a.png' has the frame's",
+        ),
+        (
+            animate("none/a.apng", &[]),
+            1,
+            "error: cannot write none/a.apng: No such file or directory",
+        ),
+        (
+            animate("teapot.ron/####.png", &["--duration", "0.1"]),
+            1,
+            "cannot make the folder teapot.ron: ",
+        ),
+        (
+            vec!["animate", "bad.ron", "-o", "new/####.png"],
+            2,
+            "error: bad.ron:2:3: ",
+        ),
         (
             vec!["render", "teapot.ron", "-o", "a.jpg"],
             2,
@@ -176,6 +244,7 @@ fn help_and_version_are_not_errors() {
             "specula render scenes/teapot.ron -o teapot.png --budget 2",
         ),
         (&["sweep", "--help"], "--fractions"),
+        (&["animate", "--help"], "frames/####.png"),
         (&["--version"], env!("CARGO_PKG_VERSION")),
     ] {
         let output = specula(directory.path(), arguments);
@@ -432,4 +501,218 @@ fn a_closed_pipe_ends_quietly_and_the_image_is_still_written() {
     assert_success(&output);
     assert_eq!(text(&output.stderr), "wrote a.png (40x30)\n");
     assert!(directory.path().join("a.png").is_file());
+}
+
+const MOVING: &str = "(
+    animation: (duration: 0.7, fps: 10, orbit: (degrees_per_second: 40)),
+    lights: [Point(position: (-5, -8, 8), orbit: ())],
+    objects: [(shape: Teapot(tessellation: 3)), (shape: Torus(), position: (3, -3, 1), spin: (axis: (1, 0, 0)))],
+)";
+
+/// A directory with a scene in it that moves.
+fn studio() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().expect("a directory");
+    fs::write(directory.path().join("film.ron"), MOVING).expect("writable");
+    directory
+}
+
+/// Films the moving scene, small.
+fn animate(directory: &Path, arguments: &[&str]) -> Output {
+    let common = ["animate", "film.ron", "--size", "64x48"];
+    let output = specula(directory, &[&common[..], arguments].concat());
+    assert_success(&output);
+    output
+}
+
+/// The pixels of all images of a PNG file.
+fn images(path: &Path) -> Vec<Vec<u8>> {
+    let file = std::io::BufReader::new(fs::File::open(path).expect("written"));
+    let mut reader = png::Decoder::new(file).read_info().expect("a PNG file");
+    let count = reader
+        .info()
+        .animation_control
+        .map_or(1, |control| control.num_frames);
+    (0..count)
+        .map(|_| {
+            let mut pixels = vec![0; reader.output_buffer_size().expect("small")];
+            reader.next_frame(&mut pixels).expect("a frame");
+            pixels
+        })
+        .collect()
+}
+
+#[test]
+fn films_show_the_scene_at_each_point_of_time() {
+    let directory = studio();
+    let place = directory.path();
+    for name in ["a.apng", "a.png", "a.y4m", "f-%03d.png", "new/folder/"] {
+        let output = animate(place, &["-o", name]);
+        let summary = text(&output.stdout);
+        assert!(summary.starts_with("7 frames of 64x48 in "), "{summary}");
+        assert!(summary.contains("rendering  median "), "{summary}");
+        let expected = format!("wrote {name} (64x48, 10 frames a second)\n");
+        assert_eq!(text(&output.stderr), expected);
+    }
+    let film = images(&place.join("a.apng"));
+    assert_eq!(film.len(), 7);
+    assert!(film == images(&place.join("a.png")));
+    for (index, time) in ["0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6"]
+        .iter()
+        .enumerate()
+    {
+        let number = index + 1;
+        let mut still = [
+            "render",
+            "film.ron",
+            "-o",
+            "still.png",
+            "--size",
+            "64x48",
+            "--time",
+            time,
+        ];
+        if index == 0 {
+            // At rest.
+            still[6..].copy_from_slice(&["--threads", "1"]);
+        }
+        assert_success(&specula(place, &still));
+        let still = &images(&place.join("still.png"))[0];
+        assert!(*still == film[index], "frame {number} of the APNG file");
+        for name in [
+            format!("f-{number:03}.png"),
+            format!("new/folder/{number:04}.png"),
+        ] {
+            assert!(*still == images(&place.join(&name))[0], "{name}");
+        }
+    }
+    assert!(
+        film.windows(2).all(|pair| pair[0] != pair[1]),
+        "nothing moves"
+    );
+    // Its frames are compared in `animation.rs`.
+    let header = "YUV4MPEG2 W64 H48 F10:1 Ip A1:1 C444 XYSCSS=444 XCOLORRANGE=LIMITED\n";
+    let y4m = fs::read(place.join("a.y4m")).expect("written");
+    assert!(y4m.starts_with(header.as_bytes()));
+    assert_eq!(y4m.len(), header.len() + 7 * (6 + 3 * 64 * 48));
+    let piped = animate(place, &["-o", "-"]);
+    assert!(piped.stdout == y4m);
+    assert!(text(&piped.stderr).starts_with("7 frames of 64x48"));
+}
+
+#[test]
+fn parts_of_a_film_are_the_frames_of_the_whole() {
+    let directory = studio();
+    let place = directory.path();
+    // A film of which two frames each show the same, so that there is something to refine further.
+    let still = MOVING.replace("degrees_per_second: 40", "degrees_per_second: 0");
+    let still = still.replace("orbit: ()", "orbit: (degrees_per_second: 3600)");
+    let still = still.replace("spin: (axis", "spin: (degrees_per_second: 1800, axis");
+    for scene in [MOVING, &still] {
+        fs::write(place.join("film.ron"), scene).expect("writable");
+        for budget in [&["--work", "120000"][..], &[]] {
+            let film = |output, rest: &[&str]| {
+                animate(
+                    place,
+                    &[&["-o", output, "--overwrite"], budget, rest].concat(),
+                );
+            };
+            film("whole/####.png", &["--threads", "2"]);
+            for shard in ["1/3", "2/3", "3/3"] {
+                film("parts/####.png", &["--shard", shard, "--threads", "1"]);
+            }
+            assert_eq!(files(&place.join("parts")), files(&place.join("whole")));
+            for name in files(&place.join("whole")) {
+                let read =
+                    |folder: &str| fs::read(place.join(folder).join(&name)).expect("written");
+                assert!(read("whole") == read("parts"), "{name} with {budget:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn finished_frames_are_kept_unless_told_otherwise() {
+    let directory = studio();
+    let place = directory.path();
+    fs::create_dir(place.join("f")).expect("writable");
+    for number in [2, 3] {
+        fs::write(place.join(format!("f/{number}.png")), "older").expect("writable");
+    }
+    let output = animate(place, &["-o", "f/#.png", "--shard", "1/2", "--json"]);
+    let frames = json_lines(&output);
+    assert_eq!(
+        files(&place.join("f")),
+        ["1.png", "2.png", "3.png", "5.png", "7.png"]
+    );
+    assert!(text(&output.stderr).contains("kept       1 frame that was there already"));
+    let numbers: Vec<_> = frames.iter().map(|frame| frame["frame"].as_u64()).collect();
+    assert_eq!(numbers, [Some(1), Some(3), Some(5), Some(7)]);
+    for frame in &frames {
+        let number = frame["frame"].as_u64().expect("a number");
+        assert_eq!(frame["kept"], number == 3);
+        assert_eq!(frame["file"], format!("f/{number}.png"));
+        assert_eq!(frame["time_s"], (number - 1) as f64 / 10.0);
+        assert_eq!(frame.get("frame_ms").is_some(), number != 3);
+    }
+
+    let output = animate(place, &["-o", "f/#.png"]);
+    assert!(text(&output.stdout).starts_with("2 frames of"));
+    assert!(text(&output.stdout).contains("kept       5 frames that were there"));
+    let output = animate(place, &["-o", "f/#.png"]);
+    assert!(text(&output.stdout).starts_with("no frames to render"));
+    assert_eq!(text(&output.stderr), "");
+    assert_eq!(fs::read(place.join("f/2.png")).expect("there"), b"older");
+
+    let output = animate(place, &["-o", "f/#.png", "--overwrite", "--budget", "0"]);
+    assert!(text(&output.stdout).contains("budget 0.00 ms: 7 late"));
+    assert_eq!(images(&place.join("f/2.png")).len(), 1);
+    let beyond = animate(place, &["-o", "f/#.png", "--shard", "8/9"]);
+    assert!(text(&beyond.stdout).starts_with("no frames to render"));
+}
+
+#[test]
+fn a_still_scene_is_filmed_from_all_sides() {
+    let directory = workplace();
+    let film = [
+        "animate",
+        "teapot.ron",
+        "-o",
+        "a.apng",
+        "--size",
+        "40x30",
+        "--duration",
+        "2",
+        "--fps",
+        "2",
+    ];
+    let output = specula(directory.path(), &film);
+    assert_success(&output);
+    assert!(
+        text(&output.stderr)
+            .starts_with("nothing moves in teapot.ron: the camera goes around it once\n")
+    );
+    let frames = images(&directory.path().join("a.apng"));
+    assert_eq!(frames.len(), 4);
+    for (a, b) in [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3)] {
+        assert!(frames[a] != frames[b], "frames {a} and {b}");
+    }
+}
+
+#[test]
+fn a_film_whose_reader_goes_away_ends_quietly() {
+    let directory = studio();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_specula"))
+        .args([
+            "animate", "film.ron", "-o", "-", "--fps", "1000", "--budget", "0",
+        ])
+        .current_dir(directory.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("it ends");
+    assert_success(&output);
+    assert_eq!(text(&output.stderr), "");
+    assert_eq!(files(directory.path()), ["film.ron"]);
 }

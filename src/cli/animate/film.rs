@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// What is to be written, as its name says.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Target {
+pub(super) enum Destination {
     Apng(PathBuf),
     Y4m(PathBuf),
     /// Y4M on standard output.
@@ -22,8 +22,8 @@ pub(super) enum Target {
     Images(SequenceName),
 }
 
-impl Target {
-    /// The target of that name.
+impl Destination {
+    /// The destination of that name.
     pub(super) fn of(path: &Path) -> Result<Self, Failure> {
         if path == Path::new("-") {
             return Ok(Self::Stdout);
@@ -162,19 +162,28 @@ mod tests {
 
     #[test]
     fn names_say_what_is_written() {
-        let target = |name: &str| Target::of(Path::new(name));
+        let destination = |name: &str| Destination::of(Path::new(name));
         for name in ["a.apng", "a.PNG", "b/c.png", "take#2.apng"] {
-            assert!(matches!(target(name), Ok(Target::Apng(_))), "{name}");
+            assert!(
+                matches!(destination(name), Ok(Destination::Apng(_))),
+                "{name}"
+            );
         }
         for name in ["a.y4m", "b/take#2.Y4M"] {
-            assert!(matches!(target(name), Ok(Target::Y4m(_))), "{name}");
+            assert!(
+                matches!(destination(name), Ok(Destination::Y4m(_))),
+                "{name}"
+            );
         }
         for name in ["####.png", "b/x-%03d.png", "b/", "/"] {
-            assert!(matches!(target(name), Ok(Target::Images(_))), "{name}");
+            assert!(
+                matches!(destination(name), Ok(Destination::Images(_))),
+                "{name}"
+            );
         }
-        assert!(matches!(target("-"), Ok(Target::Stdout)));
+        assert!(matches!(destination("-"), Ok(Destination::Stdout)));
         for name in ["a", "a.mp4", "a.gif", "####", "####.jpg", "", "-.jpg"] {
-            let failure = target(name).expect_err(name);
+            let failure = destination(name).expect_err(name);
             assert_eq!(failure.status(), 2, "{name}");
         }
     }

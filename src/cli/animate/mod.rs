@@ -9,7 +9,7 @@ pub(super) use args::{Animate, time};
 use super::Failure;
 use super::console::{Output, Progress, note};
 use super::render::frame_json;
-use film::{Film, Target};
+use film::{Destination, Film};
 use serde_json::json;
 use specula::frame::{Engine, EngineOptions, FrameStats};
 use specula::output::sequence::Shard;
@@ -22,9 +22,9 @@ use std::time::Instant;
 use summary::Summary;
 
 pub(super) fn run(args: &Animate) -> Result<(), Failure> {
-    let target = Target::of(&args.output)?;
-    check_usage(args, &target)?;
-    target.check()?;
+    let destination = Destination::of(&args.output)?;
+    check_usage(args, &destination)?;
+    destination.check()?;
     let mut scene = Scene::load(&args.scene)?;
     let timing = timing(&scene, args)?;
     if ensure_motion(&mut scene, timing) {
@@ -38,7 +38,7 @@ pub(super) fn run(args: &Animate) -> Result<(), Failure> {
     let plan: Vec<Planned> = numbers
         .map(|number| Planned {
             number,
-            keep: !args.overwrite && target.file(number).is_some_and(|file| file.is_file()),
+            keep: !args.overwrite && destination.file(number).is_some_and(|file| file.is_file()),
         })
         .collect();
     let mut job = Job {
@@ -47,7 +47,7 @@ pub(super) fn run(args: &Animate) -> Result<(), Failure> {
         scene,
         output: Output::new(),
         summary: Summary::default(),
-        target,
+        destination,
     };
     let started = Instant::now();
     let ended = job.render(&plan)?;
@@ -57,7 +57,7 @@ pub(super) fn run(args: &Animate) -> Result<(), Failure> {
     }
     let size = [args.machine.size.width, args.machine.size.height];
     let summary = job.summary.text(size, started.elapsed());
-    if args.json || job.target == Target::Stdout {
+    if args.json || job.destination == Destination::Stdout {
         note(&summary);
     } else {
         job.output.line(&summary)?;
@@ -66,14 +66,14 @@ pub(super) fn run(args: &Animate) -> Result<(), Failure> {
 }
 
 /// Refuses options that contradict each other.
-fn check_usage(args: &Animate, target: &Target) -> Result<(), Failure> {
-    if args.shard.is_some() && !target.is_sequence() {
+fn check_usage(args: &Animate, destination: &Destination) -> Result<(), Failure> {
+    if args.shard.is_some() && !destination.is_sequence() {
         return Err(Failure::input(format!(
             "--shard needs numbered files such as frames/####.png; several parts cannot be one file, '{}'",
             args.output.display()
         )));
     }
-    if args.json && *target == Target::Stdout {
+    if args.json && *destination == Destination::Stdout {
         return Err(Failure::input(
             "--json and the film cannot both go to standard output; write the film to a file",
         ));
@@ -123,7 +123,7 @@ struct Job<'a> {
     args: &'a Animate,
     timing: Timing,
     scene: Scene,
-    target: Target,
+    destination: Destination,
     output: Output,
     summary: Summary,
 }
@@ -150,7 +150,7 @@ impl Job<'_> {
         )?;
         let mut frame = Frame::new(size.width, size.height);
         let mut film = self
-            .target
+            .destination
             .clone()
             .create(size.width, size.height, &self.timing)?;
         let steps = plan.iter().filter(|planned| !planned.keep).count();
@@ -195,7 +195,7 @@ impl Job<'_> {
             None => json!({ "frame": planned.number }),
         };
         if let Some(object) = object.as_object_mut() {
-            let file = self.target.file(planned.number);
+            let file = self.destination.file(planned.number);
             object.insert("time_s".to_owned(), json!(self.seconds(planned.number)));
             object.insert("kept".to_owned(), json!(planned.keep));
             object.insert(
@@ -208,7 +208,7 @@ impl Job<'_> {
 
     fn finish(&self, film: Film, rendered: usize) -> Result<(), Failure> {
         film.finish()?;
-        if self.target != Target::Stdout && rendered > 0 {
+        if self.destination != Destination::Stdout && rendered > 0 {
             let size = self.args.machine.size;
             note(&format!(
                 "wrote {} ({}x{}, {} frames a second)",
