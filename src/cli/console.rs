@@ -1,7 +1,8 @@
 //! Printing results, and progress beside them.
 
 use super::Failure;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
@@ -60,24 +61,30 @@ impl Progress {
         } else {
             "{spinner} {msg}"
         };
-        Self::with_template(steps, template)
+        Self::with_style(steps, ProgressStyle::with_template(template).ok())
     }
 
     /// For the frames of a film: with frames per second and the time that remains. Nothing runs in the background.
     pub(super) fn frames(count: u64) -> Self {
-        Self::with_template(
-            count,
-            "{wide_bar} frame {pos}/{len}, {per_sec}, {eta} to go",
-        )
+        let template = "{wide_bar} frame {pos}/{len}, {rate} a second, {eta} to go";
+        let style = ProgressStyle::with_template(template).map(|style| {
+            style.with_key(
+                "rate",
+                |state: &ProgressState, text: &mut dyn fmt::Write| {
+                    let _ = write!(text, "{:.1}", state.per_sec());
+                },
+            )
+        });
+        Self::with_style(count, style.ok())
     }
 
-    fn with_template(steps: u64, template: &str) -> Self {
+    fn with_style(steps: u64, style: Option<ProgressStyle>) -> Self {
         let bar = if io::stderr().is_terminal() {
             ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr())
         } else {
             ProgressBar::hidden()
         };
-        if let Ok(style) = ProgressStyle::with_template(template) {
+        if let Some(style) = style {
             bar.set_style(style);
         }
         Self { bar }

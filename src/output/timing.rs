@@ -4,6 +4,7 @@
 //! (30000/1001 is called 29.97) and file formats store them so; a decimal number would drift against the sound.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 /// Longest film in seconds: a day.
@@ -13,7 +14,7 @@ pub const MAX_DURATION_S: f64 = 86_400.0;
 pub const MAX_FRAMES: u32 = 1_000_000;
 
 /// Slowest and fastest rate in frames a second.
-pub const FPS_RANGE: [f64; 2] = [0.001, 1000.0];
+pub const FPS_RANGE: RangeInclusive<f64> = 0.001..=1000.0;
 
 /// The rates of video that are not whole are 1000/1001 of these, and are written with two or three decimals.
 const NTSC: [u32; 5] = [24, 30, 48, 60, 120];
@@ -37,7 +38,7 @@ impl FrameRate {
     pub fn new(numerator: u32, denominator: u32) -> Option<Self> {
         // False for NaN, which is 0 / 0.
         let fps = f64::from(numerator) / f64::from(denominator);
-        if !(fps >= FPS_RANGE[0] && fps <= FPS_RANGE[1]) {
+        if !FPS_RANGE.contains(&fps) {
             return None;
         }
         let divisor = greatest_common_divisor(numerator, denominator);
@@ -51,7 +52,7 @@ impl FrameRate {
     /// rounded to thousandths. `None` outside of [`FPS_RANGE`].
     #[must_use]
     pub fn from_fps(fps: f64) -> Option<Self> {
-        if !(fps >= FPS_RANGE[0] && fps <= FPS_RANGE[1]) {
+        if !FPS_RANGE.contains(&fps) {
             return None;
         }
         for whole in NTSC {
@@ -132,7 +133,8 @@ impl FromStr for FrameRate {
         rate.ok_or_else(|| {
             format!(
                 "a frame rate is a number such as 30, 29.97 or 30000/1001, from {} to {}",
-                FPS_RANGE[0], FPS_RANGE[1]
+                FPS_RANGE.start(),
+                FPS_RANGE.end()
             )
         })
     }

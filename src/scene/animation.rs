@@ -193,6 +193,15 @@ impl Scene {
     /// Brings everything that the [animation](Self::animation) moves to where it is after `seconds`, which may be beyond its
     /// end, or negative; NaN and infinity count as 0. What is there already keeps its revision, as does what does not move.
     ///
+    /// ```
+    /// # use specula::Scene;
+    /// let mut scene = Scene::parse("(objects: [(shape: Teapot(), spin: ())])", "spinning.ron")?;
+    /// let rest = scene.objects()[0].author_from_mesh;
+    /// scene.set_time(1.5);
+    /// assert_ne!(scene.objects()[0].author_from_mesh, rest);
+    /// # Ok::<(), specula::scene::SceneError>(())
+    /// ```
+    ///
     /// Time overrides what was set by hand: whoever replaces a camera, light or object that moves replaces the animation
     /// too.
     pub fn set_time(&mut self, seconds: f64) {

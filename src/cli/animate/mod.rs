@@ -169,7 +169,8 @@ impl Job<'_> {
                 if film.write(planned.number, &frame)?.is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
-                self.summary.rendered(&stats);
+                self.summary
+                    .rendered(stats.frame_ms, budget, stats.estimated_error);
                 progress.step();
                 Some(stats)
             };

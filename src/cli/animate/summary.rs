@@ -1,6 +1,5 @@
 //! What is said of a film when it is done.
 
-use specula::frame::FrameStats;
 use specula::schedule::Budget;
 use std::time::Duration;
 
@@ -18,15 +17,15 @@ pub(super) struct Summary {
 }
 
 impl Summary {
-    /// Takes in a frame that was rendered.
-    pub(super) fn rendered(&mut self, stats: &FrameStats) {
-        self.frame_ms.push(stats.frame_ms);
-        if let Budget::Millis(ms) = stats.budget {
+    /// Takes in a frame that was rendered. Its error may be unknown, not finite.
+    pub(super) fn rendered(&mut self, frame_ms: f64, budget: Budget, estimated_error: f64) {
+        self.frame_ms.push(frame_ms);
+        if let Budget::Millis(ms) = budget {
             self.budget_ms = Some(ms);
-            self.late += u32::from(stats.frame_ms > ms);
+            self.late += u32::from(frame_ms > ms);
         }
-        if stats.estimated_error.is_finite() {
-            self.error.0 += stats.estimated_error;
+        if estimated_error.is_finite() {
+            self.error.0 += estimated_error;
             self.error.1 += 1;
         }
     }
@@ -121,11 +120,7 @@ mod tests {
     fn late_frames_and_errors_are_those_that_are_known() {
         let mut summary = Summary::default();
         for (frame_ms, estimated_error) in [(3.0, 0.5), (5.0, f64::NAN), (4.0, 1.5)] {
-            summary.rendered(&FrameStats {
-                frame_ms,
-                estimated_error,
-                ..FrameStats::empty(Budget::Millis(4.0))
-            });
+            summary.rendered(frame_ms, Budget::Millis(4.0), estimated_error);
         }
         summary.kept();
         assert_eq!(

@@ -88,8 +88,8 @@ fn timing<'a>(
             FrameRate::from_fps(field.number()?).ok_or_else(|| {
                 field.fail(format_args!(
                     "must be from {} to {}, but is {}",
-                    FPS_RANGE[0],
-                    FPS_RANGE[1],
+                    FPS_RANGE.start(),
+                    FPS_RANGE.end(),
                     field.excerpt()
                 ))
             })?
