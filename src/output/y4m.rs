@@ -1,8 +1,8 @@
 //! Films as YUV4MPEG2 streams (`.y4m`): raw video that encoders and players read from a pipe.
 //!
 //! A line of text, then for each frame the line `FRAME` and three planes of bytes, Y', Cb and Cr, each as large as the
-//! image (4:4:4), so that no size is odd. Values are in the limited range of video (ITU-R BT.601 section 2.5.3, BT.709
-//! section 3): with R', G', B' the encoded colour in 0 to 255 and K the weights of luma,
+//! image (4:4:4), so that no size is odd. Values are in the limited range of video (ITU-R BT.601 section 2.5, BT.709
+//! items 3 and 4): with R', G', B' the encoded colour in 0 to 255 and K the weights of luma,
 //!
 //! ```text
 //! L  = Kr R' + Kg G' + Kb B'
@@ -12,7 +12,7 @@
 //! ```
 //!
 //! rounded to the nearest, in integers, hence exactly. The weights have four decimals, so everything is multiplied by
-//! 10,000. The format cannot say which weights were used. Players go by the size (mpv, VLC, SDL): BT.709's from 1280
+//! 10,000. The format cannot say which weights were used. Players go by the size (mpv does): BT.709's from 1280
 //! pixels of width or 577 of height on, BT.601's below; so does this module. `ffmpeg` has to be told when it makes RGB of
 //! a large film (`-colorspace bt709`).
 
