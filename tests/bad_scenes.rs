@@ -292,8 +292,7 @@ const EXPECTED: &[(&str, &str)] = &[
     ),
     (
         "object_unknown_field",
-        "4:27: unknown field `translate` of `Object`; the fields are `shape`, `mesh`, `normals`, `up`, `material`, `position`, `rotate_degrees` and `scale`",
-        "4:27: unknown field `translate` of `Object`; the fields are `shape`, `material`, `position`, `rotate_degrees`, `scale` and `spin`",
+        "4:27: unknown field `translate` of `Object`; the fields are `shape`, `mesh`, `normals`, `up`, `material`, `position`, `rotate_degrees`, `scale` and `spin`",
     ),
     ("objects_not_a_list", "2:14: a list `[..]` is needed here"),
     (
