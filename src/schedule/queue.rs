@@ -6,16 +6,36 @@
 //!
 //! Order depends only on the sequence of calls, never on addresses or time.
 
-use std::collections::VecDeque;
-
 const OCTAVES: i32 = 64;
 const BUCKETS_PER_OCTAVE: i32 = 4;
 const BUCKETS: usize = (OCTAVES * BUCKETS_PER_OCTAVE) as usize;
 
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// A candidate in its bucket.
+#[derive(Clone, Copy, Debug)]
+struct Node<T> {
+    candidate: T,
+    /// The next one in the bucket, or in the list of free nodes.
+    next: u32,
+}
+
+/// The ends of a bucket's list; valid while the bucket is not empty.
+#[derive(Clone, Copy, Debug)]
+struct Bucket {
+    first: u32,
+    last: u32,
+}
+
 /// A priority queue of candidates, best rank first.
 #[derive(Clone, Debug)]
 pub struct RankedQueue<T> {
-    buckets: Vec<VecDeque<T>>,
+    /// Those of all buckets together, so that the memory needed does not depend on how ranks are spread.
+    nodes: Vec<Node<T>>,
+    /// The first free node.
+    free: u32,
+    buckets: [Bucket; BUCKETS],
     /// A bit for each bucket that is not empty.
     occupied: [u64; BUCKETS / 64],
     len: usize,
@@ -23,20 +43,25 @@ pub struct RankedQueue<T> {
 
 impl<T> Default for RankedQueue<T> {
     fn default() -> Self {
+        let empty = Bucket {
+            first: NONE,
+            last: NONE,
+        };
         Self {
-            buckets: (0..BUCKETS).map(|_| VecDeque::new()).collect(),
+            nodes: Vec::new(),
+            free: NONE,
+            buckets: [empty; BUCKETS],
             occupied: [0; BUCKETS / 64],
             len: 0,
         }
     }
 }
 
-impl<T> RankedQueue<T> {
+impl<T: Copy> RankedQueue<T> {
     /// Removes all candidates and keeps the memory.
     pub fn clear(&mut self) {
-        for bucket in &mut self.buckets {
-            bucket.clear();
-        }
+        self.nodes.clear();
+        self.free = NONE;
         self.occupied = [0; BUCKETS / 64];
         self.len = 0;
     }
@@ -56,8 +81,16 @@ impl<T> RankedQueue<T> {
     /// Adds a candidate. Ranks that are zero, negative or NaN go last, infinite ones first.
     pub fn push(&mut self, rank: f32, candidate: T) {
         let index = bucket_of(rank);
-        self.buckets[index].push_back(candidate);
-        self.occupied[index / 64] |= 1 << (index % 64);
+        let node = self.new_node(candidate);
+        let (word, bit) = (index / 64, 1 << (index % 64));
+        let bucket = &mut self.buckets[index];
+        if self.occupied[word] & bit == 0 {
+            self.occupied[word] |= bit;
+            bucket.first = node;
+        } else {
+            self.nodes[bucket.last as usize].next = node;
+        }
+        bucket.last = node;
         self.len += 1;
     }
 
@@ -65,12 +98,34 @@ impl<T> RankedQueue<T> {
     pub fn pop(&mut self) -> Option<T> {
         let word = self.occupied.iter().rposition(|&bits| bits != 0)?;
         let index = word * 64 + 63 - self.occupied[word].leading_zeros() as usize;
-        let candidate = self.buckets[index].pop_front();
-        if self.buckets[index].is_empty() {
+        let bucket = &mut self.buckets[index];
+        let taken = bucket.first;
+        let Node { candidate, next } = self.nodes[taken as usize];
+        if taken == bucket.last {
             self.occupied[word] &= !(1 << (index % 64));
+        } else {
+            bucket.first = next;
         }
+        self.nodes[taken as usize].next = self.free;
+        self.free = taken;
         self.len -= 1;
-        candidate
+        Some(candidate)
+    }
+
+    /// A node without a successor.
+    fn new_node(&mut self, candidate: T) -> u32 {
+        let node = Node {
+            candidate,
+            next: NONE,
+        };
+        let index = self.free;
+        if index == NONE {
+            self.nodes.push(node);
+            return (self.nodes.len() - 1) as u32;
+        }
+        self.free = self.nodes[index as usize].next;
+        self.nodes[index as usize] = node;
+        index
     }
 }
 
@@ -120,6 +175,22 @@ mod tests {
             assert!(rank <= last * 1.25, "{rank} after {last}");
             last = rank;
         }
+    }
+
+    #[test]
+    fn memory_is_that_of_the_most_candidates_at_once() {
+        let mut queue = RankedQueue::default();
+        for round in 0..1000_u32 {
+            // Ranks in ever other buckets, put and taken in turns.
+            let rank = |i: u32| f32::from_bits(0x3080_0000 + (round * 7 + i) % 200 * (1 << 21));
+            for i in 0..10 {
+                queue.push(rank(i), i);
+            }
+            let mut popped: Vec<_> = (0..10).filter_map(|_| queue.pop()).collect();
+            popped.sort_unstable();
+            assert_eq!(popped, (0..10).collect::<Vec<_>>());
+        }
+        assert_eq!((queue.len(), queue.nodes.len()), (0, 10));
     }
 
     #[test]
