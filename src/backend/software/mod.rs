@@ -37,7 +37,7 @@ use crate::parallel::Exec;
 use crate::simd::dispatch;
 use repaint::Job;
 use resolve::Painter;
-use shares::Share;
+use shares::Shares;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tile::{Grid, TILE_SIDE, Tile};
@@ -57,7 +57,7 @@ pub struct SoftwareBackend {
     serial: u64,
     grid: Grid,
     tiles: Vec<Tile>,
-    shares: Vec<Share>,
+    shares: Shares,
     vertices: Vertices,
     visible: Visible,
     jobs: Vec<Job>,
@@ -88,7 +88,7 @@ impl SoftwareBackend {
             serial: 0,
             grid: Grid::default(),
             tiles: Vec::new(),
-            shares: Vec::new(),
+            shares: Shares::default(),
             vertices: Vertices::default(),
             visible: Visible::default(),
             jobs: Vec::new(),
@@ -131,7 +131,7 @@ impl SoftwareBackend {
 
     fn counts(&self) -> RasterCounts {
         let mut counts = RasterCounts::default();
-        for share in &self.shares {
+        for share in self.shares.used() {
             counts.submitted += share.counts.submitted;
             counts.back_facing += share.counts.back_facing;
             counts.off_screen += share.counts.off_screen;
@@ -157,13 +157,14 @@ impl Backend for SoftwareBackend {
     fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts {
         self.fit(geometry);
         let grid = self.grid;
-        shares::cut(&mut self.shares, geometry);
-        self.vertices.transform(exec, geometry, &mut self.shares);
+        self.shares.cut(geometry);
+        self.vertices
+            .transform(exec, geometry, self.shares.used_mut());
         let vertices = &self.vertices;
-        exec.for_each_chunk(&mut self.shares, 1, |_, share| {
+        exec.for_each_chunk(self.shares.used_mut(), 1, |_, share| {
             setup::set_up(&mut share[0], geometry, grid, vertices);
         });
-        let shares = &self.shares;
+        let shares = self.shares.used();
         exec.for_each_chunk(&mut self.tiles, 1, |index, tile| {
             dispatch!(exec.level, simd => raster::draw_tile(simd, &mut tile[0], index, shares));
         });

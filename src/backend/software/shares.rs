@@ -5,6 +5,7 @@
 
 use super::setup::Prepared;
 use crate::backend::{Geometry, RasterCounts};
+use std::ops::Range;
 
 /// Fewest triangles of a share, but for the last: enough work to be worth a task.
 const SMALLEST_SHARE: u64 = 1024;
@@ -31,6 +32,13 @@ pub(super) struct Share {
 }
 
 impl Share {
+    fn with_room(triangles: usize) -> Self {
+        Self {
+            prepared: Vec::with_capacity(triangles),
+            ..Self::default()
+        }
+    }
+
     /// The ids of its triangles, ascending.
     #[inline]
     pub(super) fn triangles<'a>(
@@ -58,12 +66,49 @@ impl Share {
     }
 }
 
-/// Cuts the visible triangles into shares; their memory is kept from frame to frame.
-pub(super) fn cut(shares: &mut Vec<Share>, geometry: Geometry<'_>) {
-    let length = |range: &std::ops::Range<u32>| u64::from(range.end.saturating_sub(range.start));
-    let total: u64 = geometry.visible.iter().map(length).sum();
-    let size = SMALLEST_SHARE.max(total.div_ceil(MOST_SHARES));
-    shares.resize_with(total.div_ceil(size) as usize, Share::default);
+/// The shares of an image. Views of fewer triangles leave some unused, which keep their memory for the views to come.
+#[derive(Debug, Default)]
+pub(super) struct Shares {
+    all: Vec<Share>,
+    used: usize,
+}
+
+impl Shares {
+    /// Cuts the visible triangles into shares.
+    pub(super) fn cut(&mut self, geometry: Geometry<'_>) {
+        let total: u64 = geometry.visible.iter().map(length).sum();
+        let size = share_size(total);
+        self.used = total.div_ceil(size) as usize;
+        if self.all.len() < self.used {
+            // As many as any view's triangles may take, clipping aside, so that the next view does not need more.
+            let room = share_size(geometry.world.triangles.len() as u64) as usize;
+            self.all.resize_with(self.used, || Share::with_room(room));
+        }
+        cut_into(&mut self.all[..self.used], geometry, size, total);
+    }
+
+    /// Those of the current image, in the order of their triangles.
+    pub(super) fn used(&self) -> &[Share] {
+        &self.all[..self.used]
+    }
+
+    /// The same to be worked on.
+    pub(super) fn used_mut(&mut self) -> &mut [Share] {
+        &mut self.all[..self.used]
+    }
+}
+
+/// How many triangles a share holds, but for the last, when there are `total`.
+fn share_size(total: u64) -> u64 {
+    SMALLEST_SHARE.max(total.div_ceil(MOST_SHARES))
+}
+
+/// Number of triangles in a range.
+fn length(range: &Range<u32>) -> u64 {
+    u64::from(range.end.saturating_sub(range.start))
+}
+
+fn cut_into(shares: &mut [Share], geometry: Geometry<'_>, size: u64, total: u64) {
     let (mut range, mut skip, mut left) = (0, 0, total);
     for share in shares {
         share.range = range;
@@ -100,6 +145,8 @@ mod tests {
                 eye: Eye::Point([0.0; 3]),
             },
         );
+        // One after the other in the same memory.
+        let mut shares = Shares::default();
         let many = (0..5000).map(|i| i * 10..i * 10 + i % 4).collect();
         let (none, few, large) = (3..3, 0..5, 0..200_000);
         for visible in [
@@ -115,10 +162,10 @@ mod tests {
                 view: &view,
                 visible: &visible,
             };
-            let mut shares = Vec::new();
-            cut(&mut shares, geometry);
-            assert!(shares.len() as u64 <= MOST_SHARES);
-            let got: Vec<_> = shares.iter().flat_map(|s| s.triangles(geometry)).collect();
+            shares.cut(geometry);
+            let used = shares.used();
+            assert!(used.len() as u64 <= MOST_SHARES);
+            let got: Vec<_> = used.iter().flat_map(|s| s.triangles(geometry)).collect();
             let want: Vec<_> = visible
                 .iter()
                 .cloned()

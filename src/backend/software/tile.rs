@@ -72,7 +72,8 @@ impl Tile {
             covered: 0,
             filled: None,
             serial,
-            runs: Vec::new(),
+            // As many as there can be: a moving view would make every tile's list grow time and again.
+            runs: Vec::with_capacity(TILE_PIXELS),
         }
     }
 
