@@ -38,6 +38,16 @@ pub struct Vec3s {
 }
 
 impl Vec3s {
+    /// No vectors, and room for `capacity`.
+    #[must_use]
+    pub fn with_capacity(capacity: usize) -> Self {
+        Self {
+            x: Vec::with_capacity(capacity),
+            y: Vec::with_capacity(capacity),
+            z: Vec::with_capacity(capacity),
+        }
+    }
+
     /// Number of vectors.
     #[must_use]
     pub fn len(&self) -> usize {

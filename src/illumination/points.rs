@@ -13,12 +13,25 @@ use fearless_simd::prelude::*;
 const CHUNK: usize = 256;
 
 /// Points of one material.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Chunk {
     material: u16,
     points: Vec3s,
     normals: Vec3s,
     colours: Vec3s,
+}
+
+impl Chunk {
+    /// A chunk that never has to grow.
+    fn new() -> Self {
+        let [points, normals, colours] = std::array::from_fn(|_| Vec3s::with_capacity(CHUNK));
+        Self {
+            material: 0,
+            points,
+            normals,
+            colours,
+        }
+    }
 }
 
 /// A batch of points to be illuminated under all lights. Points of the same material share SIMD lanes, wherever in the
@@ -74,7 +87,7 @@ impl PointBatch {
         let index = self.used;
         self.used += 1;
         if self.chunks.len() == index {
-            self.chunks.push(Chunk::default());
+            self.chunks.push(Chunk::new());
         }
         let chunk = &mut self.chunks[index];
         chunk.material = material;

@@ -80,7 +80,8 @@ pub struct Forest {
     pub(super) planner: Planner,
     /// Roots planted since the last illumination.
     fresh: Vec<(LeafId, Range<usize>)>,
-    /// First half-edge on each welded edge.
+    /// First half-edge on each welded edge, or `NONE`. Edges stay until the next image: the marks that a hash table leaves in
+    /// place of removed entries can make it grow though it was large enough for the same work before.
     edges: FxHashMap<[u32; 2], u32>,
     planted: FxHashMap<u32, LeafId>,
     open: usize,
@@ -356,11 +357,7 @@ impl Forest {
             return;
         };
         if *head == gone {
-            if after == NONE {
-                self.edges.remove(&key);
-            } else {
-                *head = after;
-            }
+            *head = after;
             return;
         }
         let mut at = *head;
