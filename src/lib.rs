@@ -4,6 +4,7 @@
 //! highlight, ranks what deviates from per-pixel Phong shading by visible pixels and error, and
 //! spends the rest of the budget refining it, frame after frame, until the image equals Phong shading.
 
+#![forbid(unsafe_code)]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod backend;

@@ -1,5 +1,7 @@
 //! The `specula` program.
 
+#![forbid(unsafe_code)]
+
 mod cli;
 
 fn main() -> std::process::ExitCode {

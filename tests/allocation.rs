@@ -1,0 +1,240 @@
+//! After warm-up a frame allocates nothing, for a still and for a moving view.
+//!
+//! Allocations are counted over all threads of the process, so this is one test: between two, the harness allocates too.
+//! The engines run on the test's thread, inside a pool, and called from outside a pool. All but the first share one pool,
+//! which outlives them, because threads that end allocate as well.
+//!
+//! What is counted is exact and repeatable: budgets are in work units.
+
+use glam::DVec3;
+use rayon::ThreadPool;
+use specula::scene::Camera;
+use specula::{Budget, Engine, EngineOptions, Frame, FrameStats, Method, Scene};
+use std::fmt;
+use std::path::Path;
+use std::sync::Arc;
+
+const WIDTH: u32 = 320;
+const HEIGHT: u32 = 180;
+
+/// Views around the scene, and frames of each: one that draws it, one that goes on refining it.
+const VIEWS: u32 = 8;
+const FRAMES_PER_VIEW: u32 = 2;
+const FRAMES_PER_LAP: u64 = (VIEWS * FRAMES_PER_VIEW) as u64;
+
+/// Enough for some hundred splits a frame, too little to converge at once.
+const WORK: Budget = Budget::Work(300_000);
+
+/// Jobs in a block of the queue through which a rayon pool is called from outside (`crossbeam_deque::Injector`). It
+/// allocates block by block.
+const JOBS_PER_BLOCK: u64 = 63;
+
+/// The only unsafe code of the package: an allocator that counts.
+mod counting {
+    #![allow(
+        unsafe_code,
+        reason = "an allocator cannot be written without; it hands everything on to the system's"
+    )]
+
+    use std::alloc::{GlobalAlloc, Layout, System};
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    #[global_allocator]
+    static ALLOCATOR: Counting = Counting;
+
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+
+    /// Memory asked for so far, by all threads: blocks made and blocks resized.
+    pub(super) fn allocations() -> u64 {
+        COUNT.load(Ordering::SeqCst)
+    }
+
+    struct Counting;
+
+    // SAFETY: every call goes on to the system's allocator as it is, which keeps the contract; counting neither allocates
+    // nor unwinds.
+    unsafe impl GlobalAlloc for Counting {
+        unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+            COUNT.fetch_add(1, Ordering::SeqCst);
+            // SAFETY: the caller keeps the contract of `alloc`.
+            unsafe { System.alloc(layout) }
+        }
+
+        unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+            COUNT.fetch_add(1, Ordering::SeqCst);
+            // SAFETY: the caller keeps the contract of `alloc_zeroed`.
+            unsafe { System.alloc_zeroed(layout) }
+        }
+
+        unsafe fn realloc(&self, block: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
+            COUNT.fetch_add(1, Ordering::SeqCst);
+            // SAFETY: the caller keeps the contract of `realloc`, and all blocks are the system allocator's.
+            unsafe { System.realloc(block, layout, new_size) }
+        }
+
+        unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+            // SAFETY: the caller keeps the contract of `dealloc`, and all blocks are the system allocator's.
+            unsafe { System.dealloc(block, layout) }
+        }
+    }
+}
+
+/// Where an engine is called from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Caller {
+    /// A thread, the engine using no other.
+    OneThread,
+    /// A thread of the pool that the engine runs in.
+    Inside,
+    /// A thread outside of the pool that the engine runs in.
+    Outside,
+}
+
+/// An engine with its scene and frame.
+struct Show {
+    scene: Scene,
+    camera: Camera,
+    engine: Engine,
+    frame: Frame,
+}
+
+impl Show {
+    fn new(scene: Scene, method: Method, pool: Option<&Arc<ThreadPool>>) -> Self {
+        let options = EngineOptions {
+            method,
+            threads: Some(1),
+            pool: pool.cloned(),
+            ..EngineOptions::default()
+        };
+        Self {
+            engine: Engine::with_options(&scene, options).expect("an engine"),
+            camera: *scene.camera(),
+            frame: Frame::new(WIDTH, HEIGHT),
+            scene,
+        }
+    }
+
+    fn render(&mut self) -> FrameStats {
+        self.engine.render(&self.scene, WORK, &mut self.frame)
+    }
+
+    /// Goes once around the scene, starting `offset` of a step from where its camera stands. Says how many allocations
+    /// there were.
+    fn lap(&mut self, offset: f64) -> u64 {
+        let before = counting::allocations();
+        for view in 0..VIEWS {
+            let turn = (f64::from(view) + offset) / f64::from(VIEWS);
+            self.scene.set_camera(turned(&self.camera, turn));
+            for _ in 0..FRAMES_PER_VIEW {
+                self.render();
+            }
+        }
+        counting::allocations() - before
+    }
+
+    /// Stays where the camera stands until the image has converged, and for three frames more. Says how many allocations
+    /// and frames there were.
+    fn stay(&mut self) -> (u64, u64) {
+        self.scene.set_camera(self.camera);
+        self.engine.forget();
+        let before = counting::allocations();
+        let mut frames = 3;
+        while !self.render().converged {
+            frames += 1;
+            assert!(frames < 1000, "it does not converge");
+        }
+        for _ in 0..3 {
+            self.render();
+        }
+        (counting::allocations() - before, frames + 1)
+    }
+
+    /// Tries everything out, and complains as `case` when there are too many allocations.
+    fn run(&mut self, caller: Caller, case: &dyn fmt::Display) {
+        // One for each block begun, if frames go through the queue at all.
+        let from_queue = |frames: u64| match caller {
+            Caller::OneThread | Caller::Inside => 0,
+            Caller::Outside => frames.div_ceil(JOBS_PER_BLOCK),
+        };
+
+        // The first time around and the first refinement to the end are the warm-up.
+        let first = self.lap(0.0);
+        assert!(first > 0, "{case}: the allocator does not count");
+        let again = self.lap(0.0);
+        assert!(
+            again <= from_queue(FRAMES_PER_LAP),
+            "{case}: going around again takes {again} allocations"
+        );
+
+        self.stay();
+        let (allocations, frames) = self.stay();
+        assert!(
+            allocations <= from_queue(frames),
+            "{case}: a still view takes {allocations} allocations in {frames} frames"
+        );
+
+        // Views that were not seen before may need a little more room, once.
+        let between = self.lap(0.5);
+        assert!(
+            between <= from_queue(FRAMES_PER_LAP) + FRAMES_PER_LAP,
+            "{case}: other views take {between} allocations"
+        );
+        let again = self.lap(0.5);
+        assert!(
+            again <= from_queue(FRAMES_PER_LAP),
+            "{case}: going around between takes {again} allocations"
+        );
+    }
+}
+
+/// The camera, gone around its target by some turns.
+fn turned(camera: &Camera, turns: f64) -> Camera {
+    let (sin, cos) = (turns * std::f64::consts::TAU).sin_cos();
+    let from = camera.position - camera.target;
+    let around = DVec3::new(
+        cos * from.x - sin * from.y,
+        sin * from.x + cos * from.y,
+        from.z,
+    );
+    Camera {
+        position: camera.target + around,
+        ..*camera
+    }
+}
+
+/// Scenes that load the stages in different ways; the last has a quarter of the triangles of `heavy`.
+fn scenes() -> impl Iterator<Item = (&'static str, Scene)> {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let read = move |name: &str| {
+        let text = std::fs::read_to_string(directory.join(name).with_extension("ron"));
+        let text = text
+            .expect(name)
+            .replace("tessellation: 32", "tessellation: 16");
+        Scene::parse(&text, name).expect(name)
+    };
+    ["teapot", "walls", "lights16", "minimal", "closeup", "heavy"]
+        .into_iter()
+        .map(move |name| (name, read(name)))
+}
+
+#[test]
+fn frames_allocate_nothing_after_warm_up() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+    let pool = Arc::new(pool.expect("a pool"));
+    // A thread allocates when it starts, which is not before it does something.
+    pool.broadcast(|_| ());
+    for (name, scene) in scenes() {
+        for method in Method::ALL {
+            for caller in [Caller::OneThread, Caller::Inside, Caller::Outside] {
+                let scene = scene.clone();
+                let used = (caller != Caller::OneThread).then_some(&pool);
+                let mut show = Show::new(scene, method, used);
+                let case = format!("{name}, {method}, {caller:?}");
+                match caller {
+                    Caller::Inside => pool.install(|| show.run(caller, &case)),
+                    _ => show.run(caller, &case),
+                }
+            }
+        }
+    }
+}
