@@ -86,6 +86,13 @@ impl Vec3s {
         self.z.push(v[2]);
     }
 
+    /// Makes room for `additional` more vectors.
+    pub fn reserve(&mut self, additional: usize) {
+        self.x.reserve(additional);
+        self.y.reserve(additional);
+        self.z.reserve(additional);
+    }
+
     /// Removes all vectors and keeps the memory.
     pub fn clear(&mut self) {
         self.x.clear();

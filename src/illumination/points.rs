@@ -54,6 +54,13 @@ impl PointBatch {
         self.places.clear();
     }
 
+    /// Makes room for `points` points of one material.
+    pub fn reserve(&mut self, points: usize) {
+        let chunks = points.div_ceil(CHUNK).max(self.chunks.len());
+        self.chunks.resize_with(chunks, Chunk::new);
+        self.places.reserve(points);
+    }
+
     /// Number of points.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -30,6 +30,9 @@ pub const EDGE_SHARE: f32 = 16.0 / 135.0;
 /// Most samples inside one leaf.
 pub const MAX_SAMPLES: usize = 64;
 
+/// Samples that are evaluated together, as a rule at most: what fits into a piece of work.
+pub const SAMPLES_AT_ONCE: usize = 2048;
+
 /// Points that are illuminated to be compared with interpolated colours.
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
@@ -43,8 +46,21 @@ impl Samples {
     /// Removes all samples and keeps the memory.
     pub fn clear(&mut self) {
         self.batch.clear();
+        self.colours.clear();
         self.interpolated.clear();
         self.deviation.clear();
+    }
+
+    /// Makes room for `samples` samples.
+    pub fn reserve(&mut self, samples: usize) {
+        self.batch.reserve(samples);
+        for array in [
+            &mut self.colours,
+            &mut self.interpolated,
+            &mut self.deviation,
+        ] {
+            array.reserve(samples);
+        }
     }
 
     /// Number of samples.

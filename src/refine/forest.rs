@@ -1,7 +1,7 @@
 //! The leaves of all subdivided triangles, and which leaves meet at an edge.
 
-use super::estimate::{self, Samples};
-use super::split::Planner;
+use super::estimate::{self, SAMPLES_AT_ONCE, Samples};
+use super::split::{CHILDREN_AT_ONCE, Planner};
 use super::vertices::VertexPool;
 use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
@@ -19,6 +19,10 @@ pub(super) const NONE: u32 = u32::MAX;
 /// Most leaves a forest holds, split ones included. When it is full nothing is subdivided any more; per-pixel shading
 /// finishes the image.
 pub(super) const MAX_LEAVES: usize = 1 << 18;
+
+/// Leaves that there is room for from the start, lest moving views make every list grow again and again. To make so many takes
+/// longer than a frame of an animation lasts; only a view that stays refines further.
+pub const FIRST_LEAVES: usize = 1 << 13;
 
 /// What has become of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +102,12 @@ impl Forest {
         self.edges.clear();
         self.planted.clear();
         self.open = 0;
+        self.leaves.reserve(FIRST_LEAVES);
+        self.samples.reserve(SAMPLES_AT_ONCE);
+        self.planner.make_room();
+        self.edges.reserve(2 * FIRST_LEAVES);
+        self.planted.reserve(FIRST_LEAVES);
+        self.fresh.reserve(CHILDREN_AT_ONCE);
     }
 
     /// A leaf.

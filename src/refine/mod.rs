@@ -28,7 +28,7 @@ mod forest;
 mod split;
 mod vertices;
 
-pub use forest::{Forest, Leaf, LeafId, LeafState};
+pub use forest::{FIRST_LEAVES, Forest, Leaf, LeafId, LeafState};
 pub use split::{PlanOutcome, SplitOutcome};
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Splitting leaves along marked edges: planned, illuminated, then committed if it helps.
 
-use super::estimate::{deviations, mean_square};
+use super::estimate::{SAMPLES_AT_ONCE, deviations, mean_square};
 use super::forest::{Forest, LeafError, LeafId, LeafState, NONE, Seedling};
 use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
@@ -17,6 +17,9 @@ const POINTS: [[f32; 3]; 6] = [
     [0.0, 0.5, 0.5],
     [0.5, 0.0, 0.5],
 ];
+
+/// Children that are planned together, as a rule at most: what fits into a piece of work.
+pub(super) const CHILDREN_AT_ONCE: usize = 512;
 
 /// The outcome of asking for a split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +92,23 @@ impl Planner {
         self.splits.clear();
         self.parents.clear();
         self.children.clear();
+    }
+
+    /// Makes room for what is planned together as a rule.
+    pub(super) fn make_room(&mut self) {
+        self.splits.reserve(CHILDREN_AT_ONCE);
+        self.parents.reserve(CHILDREN_AT_ONCE);
+        self.children.reserve(CHILDREN_AT_ONCE);
+        self.concluded.clear();
+        self.concluded.reserve(CHILDREN_AT_ONCE);
+        for array in [
+            &mut self.check_colours,
+            &mut self.check_interpolated,
+            &mut self.check_deviation,
+        ] {
+            array.clear();
+            array.reserve(SAMPLES_AT_ONCE);
+        }
     }
 
     /// Leaves that will be added if every planned split is committed.

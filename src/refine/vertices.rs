@@ -3,7 +3,8 @@
 //! Vertex numbers below the world's vertex count are the world's own; the others index this pool. Each has a
 //! *welded* position number besides: two vertices with the same one are at the same place.
 
-use super::estimate::Samples;
+use super::estimate::{SAMPLES_AT_ONCE, Samples};
+use super::forest::FIRST_LEAVES;
 use crate::geometry::Vec3s;
 use crate::parallel::Exec;
 use crate::scene::{Eye, World};
@@ -11,6 +12,9 @@ use rustc_hash::FxHashMap;
 
 /// Colour, linear RGB.
 pub(super) type Colour = [f32; 3];
+
+/// Vertices that there is room for from the start.
+const FIRST_VERTICES: usize = 2 * FIRST_LEAVES;
 
 /// The refined vertices, in order of creation.
 #[derive(Clone, Debug, Default)]
@@ -52,6 +56,26 @@ impl VertexPool {
         self.by_weld.clear();
         // Welded numbers of the world are below its vertex count.
         self.next_weld = self.first;
+        self.make_room();
+    }
+
+    /// Makes room for [`FIRST_VERTICES`], once.
+    fn make_room(&mut self) {
+        for array in [
+            &mut self.positions,
+            &mut self.normals,
+            &mut self.colours,
+            &mut self.surplus,
+        ] {
+            array.reserve(FIRST_VERTICES);
+        }
+        self.material.reserve(FIRST_VERTICES);
+        self.weld.reserve(FIRST_VERTICES);
+        self.parents.reserve(FIRST_VERTICES);
+        self.by_vertices.reserve(FIRST_VERTICES);
+        self.by_weld.reserve(FIRST_VERTICES);
+        self.scratch.clear();
+        self.scratch.reserve(SAMPLES_AT_ONCE);
     }
 
     fn index(&self, vertex: u32) -> Option<usize> {

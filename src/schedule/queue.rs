@@ -66,6 +66,11 @@ impl<T: Copy> RankedQueue<T> {
         self.len = 0;
     }
 
+    /// Makes room for `additional` more candidates.
+    pub fn reserve(&mut self, additional: usize) {
+        self.nodes.reserve(additional);
+    }
+
     /// Number of candidates.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -25,8 +25,8 @@ use super::stats::FrameStats;
 use crate::backend::{Backend, Patch};
 use crate::illumination::ActiveLights;
 use crate::parallel::Exec;
-use crate::refine::estimate::Samples;
-use crate::refine::{Forest, LeafId, SplitOutcome};
+use crate::refine::estimate::{SAMPLES_AT_ONCE, Samples};
+use crate::refine::{FIRST_LEAVES, Forest, LeafId, SplitOutcome};
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, RankedQueue};
 pub(super) use leaves::for_each_leaf;
@@ -36,6 +36,9 @@ use std::collections::VecDeque;
 
 /// Nominal nanoseconds of a piece.
 const PIECE_UNITS: u64 = 50_000;
+
+/// Patches, leaves or candidates in a piece, as a rule at most.
+const ENTRIES_AT_ONCE: usize = 512;
 
 /// A triangle of fewer pixels is ranked by its corners alone: a sample would cost as much as shading some of them.
 const PIXELS_FOR_CENTROID: u32 = 8;
@@ -184,6 +187,25 @@ impl Refinement {
         self.counters = Counters::default();
     }
 
+    /// Makes room, once for an image size, for what is on the lists as a rule at most while the view moves.
+    fn make_room(&mut self, view: &View) {
+        let pixels = view.width as usize * view.height as usize;
+        self.parts.reserve(parts::most(pixels));
+        self.paints.reserve(ENTRIES_AT_ONCE + pixels / 256);
+        self.samples.reserve(SAMPLES_AT_ONCE);
+        self.queue.reserve(ENTRIES_AT_ONCE);
+        self.progressing.reserve(FIRST_LEAVES);
+        self.piece.clear();
+        self.piece.reserve(ENTRIES_AT_ONCE);
+        self.owners.clear();
+        self.owners.reserve(ENTRIES_AT_ONCE);
+        self.planted.clear();
+        self.planted.reserve(ENTRIES_AT_ONCE);
+        self.splits.clear();
+        self.splits.reserve(ENTRIES_AT_ONCE);
+        self.deferred.reserve(ENTRIES_AT_ONCE);
+    }
+
     /// Whether there is nothing left to refine.
     pub(super) fn is_finished(&self) -> bool {
         self.queue.is_empty() && self.paints.is_empty()
@@ -200,6 +222,7 @@ impl Refinement {
         backend: &dyn Backend,
     ) {
         self.clear();
+        self.make_room(view);
         self.forest.reset(world);
         self.root_of_triangle
             .resize(world.triangles.len(), u32::MAX);

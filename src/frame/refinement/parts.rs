@@ -26,6 +26,11 @@ pub(super) fn is_large(pixels: f32) -> bool {
     pixels > 2.0 * PART_PIXELS
 }
 
+/// How many parts an image of so many pixels is cut into, as a rule at most: all have more than [`PART_PIXELS`]` / 4` pixels.
+pub(super) fn most(pixels: usize) -> usize {
+    pixels * 4 / PART_PIXELS as usize
+}
+
 /// A part of a leaf that is waiting to be shaded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
