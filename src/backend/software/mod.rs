@@ -79,6 +79,16 @@ impl Default for SoftwareBackend {
     }
 }
 
+/// Gives a list its length for this image, new elements being `value` and old ones whatever they were. When that takes more
+/// memory, it is twice as much, so that the next views do well with it.
+fn fit<T: Clone>(list: &mut Vec<T>, len: usize, value: T) {
+    if list.capacity() < len {
+        list.clear();
+        list.reserve_exact(2 * len);
+    }
+    list.resize(len, value);
+}
+
 impl SoftwareBackend {
     /// A backend without an image.
     #[must_use]
@@ -91,7 +101,7 @@ impl SoftwareBackend {
             shares: Shares::default(),
             vertices: Vertices::default(),
             visible: Visible::default(),
-            jobs: Vec::new(),
+            jobs: Vec::with_capacity(repaint::FIRST_JOBS),
         }
     }
 

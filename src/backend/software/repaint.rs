@@ -28,6 +28,9 @@ use fearless_simd::{Bytes, Select, SimdBase, SimdInt, SimdMask};
 /// Jobs are not split into fewer than these.
 const JOBS_PER_TASK: usize = 4;
 
+/// Jobs that there is room for from the start: many times what a piece of refinement needs as a rule.
+pub(super) const FIRST_JOBS: usize = 4096;
+
 /// Pixels of a batch, at most: as many as keep it in the first-level cache, cheap to clear.
 const BATCH: usize = 256;
 

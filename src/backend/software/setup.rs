@@ -9,6 +9,7 @@
 //! Bins are made for each share of triangles by itself (a counting sort by tile), and a tile looks into every share's bin in
 //! turn: nothing is merged, and each bin lists its triangles in ascending order.
 
+use super::fit;
 use super::shares::Share;
 use super::tile::{Bounds, Grid};
 use super::transform::Vertices;
@@ -164,10 +165,7 @@ fn bin(share: &mut Share, grid: Grid) {
     for i in 2..starts.len() {
         starts[i] += starts[i - 1];
     }
-    share.bin_entries.clear();
-    share
-        .bin_entries
-        .resize(starts[starts.len() - 1] as usize, 0);
+    fit(&mut share.bin_entries, starts[starts.len() - 1] as usize, 0);
     for (index, prepared) in share.prepared.iter().enumerate() {
         for tile in grid.touched(&prepared.bounds) {
             let next = &mut starts[tile + 1];

@@ -3,6 +3,7 @@
 //! Triangles that own no pixel, usually the most, are never touched: a bit per triangle says whether it is visible, and only the
 //! entries of those that are, are valid in the arrays that have one for each.
 
+use super::fit;
 use super::setup::{Outline, corners};
 use super::tile::{Bounds, Grid, Tile};
 use super::transform::Vertices;
@@ -82,7 +83,7 @@ impl Visible {
         vertices: &Vertices,
     ) {
         let ids = &self.ids;
-        self.triangles.resize(ids.len(), VisibleTriangle::default());
+        fit(&mut self.triangles, ids.len(), VisibleTriangle::default());
         exec.for_each_chunk(&mut self.triangles, TRIANGLES_PER_TASK, |task, chunk| {
             for (&id, triangle) in ids[task * TRIANGLES_PER_TASK..].iter().zip(chunk) {
                 *triangle = prepare_triangle(geometry, grid, vertices, id);
