@@ -1,4 +1,4 @@
-//! After warm-up a frame allocates nothing, for a still and for a moving view.
+//! After warm-up a frame allocates nothing: for a still view, a moving one, and where light and objects change.
 //!
 //! Allocations are counted over all threads of the process, so this is one test: between two, the harness allocates too.
 //! The engines run on the test's thread, inside a pool, and called from outside a pool. All but the first share one pool,
@@ -6,9 +6,9 @@
 //!
 //! What is counted is exact and repeatable: budgets are in work units.
 
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 use rayon::ThreadPool;
-use specula::scene::Camera;
+use specula::scene::{Camera, Light};
 use specula::{Budget, Engine, EngineOptions, Frame, FrameStats, Method, Scene};
 use std::fmt;
 use std::path::Path;
@@ -18,7 +18,7 @@ const WIDTH: u32 = 320;
 const HEIGHT: u32 = 180;
 
 /// Views around the scene, and frames of each: one that draws it, one that goes on refining it.
-const VIEWS: u32 = 8;
+const VIEWS: u32 = 6;
 const FRAMES_PER_VIEW: u32 = 2;
 const FRAMES_PER_LAP: u64 = (VIEWS * FRAMES_PER_VIEW) as u64;
 
@@ -90,10 +90,13 @@ enum Caller {
     Outside,
 }
 
-/// An engine with its scene and frame.
+/// An engine with its scene, what was in it at first, and its frame.
 struct Show {
     scene: Scene,
     camera: Camera,
+    light: Light,
+    /// Where the first object is, if it may turn.
+    place: Option<DMat4>,
     engine: Engine,
     frame: Frame,
 }
@@ -109,6 +112,8 @@ impl Show {
         Self {
             engine: Engine::with_options(&scene, options).expect("an engine"),
             camera: *scene.camera(),
+            light: scene.lights()[0],
+            place: None,
             frame: Frame::new(WIDTH, HEIGHT),
             scene,
         }
@@ -147,6 +152,23 @@ impl Show {
             self.render();
         }
         (counting::allocations() - before, frames + 1)
+    }
+
+    /// Stays where it is while a light fades and the first object, if it may, turns a little. Says how many allocations there were.
+    fn change(&mut self) -> u64 {
+        let (light, place) = (self.light, self.place);
+        let before = counting::allocations();
+        for frame in 0..FRAMES_PER_LAP as u32 {
+            let share = f64::from(frame) / FRAMES_PER_LAP as f64;
+            let radiance = light.radiance.map(|c| c * share);
+            self.scene.set_light(0, Light { radiance, ..light });
+            let turn = DMat4::from_rotation_z(0.02 * share);
+            if let Some(place) = place {
+                self.scene.set_transform(0, place * turn);
+            }
+            self.render();
+        }
+        counting::allocations() - before
     }
 
     /// Tries everything out, and complains as `case` when there are too many allocations.
@@ -190,6 +212,13 @@ impl Show {
         assert!(
             again <= from_queue(FRAMES_PER_LAP),
             "{case}: going around between takes {again} allocations"
+        );
+
+        self.change();
+        let again = self.change();
+        assert!(
+            again <= from_queue(FRAMES_PER_LAP),
+            "{case}: changing the scene again takes {again} allocations"
         );
     }
 }
@@ -236,6 +265,8 @@ fn frames_allocate_nothing_after_warm_up() {
                 let scene = scene.clone();
                 let used = (caller != Caller::OneThread).then_some(&pool);
                 let mut show = Show::new(scene, method, used);
+                // Walls that meet no longer do when one turns; which triangles are neighbours is then found out anew.
+                show.place = (name != "walls").then(|| show.scene.objects()[0].author_from_mesh);
                 let case = format!("{name}, {method}, {caller:?}");
                 match caller {
                     Caller::Inside => pool.install(|| show.run(caller, &case)),
