@@ -1,6 +1,7 @@
 //! What is rendered: meshes, their topology and clusters, shapes, and the rules by which a triangle becomes pixels.
 
 pub mod bary;
+mod closed;
 pub mod clusters;
 pub mod import;
 pub mod normals;

@@ -16,6 +16,7 @@ use super::mesh_file::{MeshUp, load_mesh};
 use super::{
     Camera, Extent, Light, LightKind, Material, Object, Projection, ReflectionModel, Rgb, Scene,
 };
+use crate::geometry::Mesh;
 use crate::geometry::import::Normals;
 use crate::math::Bounds;
 use glam::{DMat3, DMat4, DVec3};
@@ -58,16 +59,25 @@ const MATERIAL: Material = Material {
     two_sided: true,
 };
 
+/// The material of a mesh: of one that is closed nobody sees the back.
+fn material(mesh: &Mesh) -> Material {
+    Material {
+        two_sided: !mesh.is_closed(),
+        ..MATERIAL
+    }
+}
+
 /// Loads a mesh file and puts it into a scene.
 pub(super) fn load(path: &Path) -> Result<Scene, SceneError> {
     let mesh = load_mesh(path, Normals::default())?;
+    let material = material(&mesh);
     let object = Object {
         mesh: Arc::new(mesh),
         material: 0,
         author_from_mesh: DMat4::from_mat3(MeshUp::default().scene_from_file()),
     };
     let stage = Stage::of(&object);
-    let mut scene = Scene::new(vec![MATERIAL], vec![object]);
+    let mut scene = Scene::new(vec![material], vec![object]);
     scene.set_camera(stage.camera());
     scene.set_lights(stage.lights());
     scene.set_ambient(AMBIENT);
