@@ -142,14 +142,18 @@ fn split(items: &mut [Item], sizes: &mut Vec<usize>) {
 fn bound(positions: &Vec3s, triangles: &[[u32; 3]], first: u32) -> Cluster {
     let corners = |t: &[u32; 3]| t.map(|v| DVec3::from(positions.get(v as usize).map(f64::from)));
     let (center, radius) = ball(triangles.iter().flat_map(corners));
-    let (cone_axis, cone_cos) = normal_cone(triangles.iter().map(corners));
+    let mut faces = Faces::default();
+    for triangle in triangles {
+        faces.add(corners(triangle));
+    }
+    let (cone_axis, cone_cos) = faces.normal_cone();
     Cluster {
         triangles: first..first + triangles.len() as u32,
         center,
         radius,
         cone_axis,
         cone_cos,
-        min_altitude: min_altitude(triangles.iter().map(corners)),
+        min_altitude: faces.min_altitude(),
     }
 }
 
@@ -174,54 +178,88 @@ fn ball(points: impl Iterator<Item = DVec3> + Clone) -> ([f32; 3], f32) {
     (center.to_array(), radius)
 }
 
-/// Axis and cosine of the half-angle of a cone about all face normals.
-fn normal_cone(triangles: impl Iterator<Item = [DVec3; 3]> + Clone) -> ([f32; 3], f32) {
-    let everything = (DVec3::Z.as_vec3().to_array(), -1.0);
-    let crosses = triangles.map(|[a, b, c]| {
-        let (u, v) = (b - a, c - a);
-        (u.cross(v), u.length() * v.length())
-    });
-    let mut sum = DVec3::ZERO;
-    for (cross, product) in crosses.clone() {
-        let length = cross.length();
-        if length > product * 2.0_f64.powi(-30) {
-            sum += cross / length;
-        } else if length != 0.0 {
-            // A needle whose normal is uncertain, or NaN.
-            return everything;
+/// What the faces of a cluster have in common, each looked at once.
+struct Faces {
+    /// Unit normals of the triangles with an area.
+    normals: [DVec3; MAX_TRIANGLES],
+    count: usize,
+    sum: DVec3,
+    /// Whether every triangle's normal is known well, or it has no area.
+    are_certain: bool,
+    /// The smallest altitude of a triangle with three different corners, less what it may be off.
+    altitude: f64,
+}
+
+impl Default for Faces {
+    fn default() -> Self {
+        Self {
+            normals: [DVec3::ZERO; MAX_TRIANGLES],
+            count: 0,
+            sum: DVec3::ZERO,
+            are_certain: true,
+            altitude: f64::INFINITY,
         }
-    }
-    let Some(axis) = sum.try_normalize() else {
-        return everything;
-    };
-    let axis = axis.as_vec3();
-    let cos = crosses
-        .filter(|(cross, _)| *cross != DVec3::ZERO)
-        .map(|(cross, _)| cross.normalize().dot(axis.as_dvec3()))
-        .fold(1.0, f64::min);
-    let padded = ((cos - CONE_PADDING) as f32).next_down();
-    if padded.is_finite() && axis.is_finite() {
-        (axis.to_array(), padded.max(-1.0))
-    } else {
-        everything
     }
 }
 
-/// A lower bound of the altitudes of all triangles with three different corners, 0 if there are none.
-fn min_altitude(triangles: impl Iterator<Item = [DVec3; 3]>) -> f32 {
-    let min = triangles
-        .filter(|[a, b, c]| a != b && b != c && c != a)
-        .map(|[a, b, c]| {
-            let (u, v) = (b - a, c - a);
-            let longest = u.length().max(v.length()).max(b.distance(c));
+impl Faces {
+    fn add(&mut self, [a, b, c]: [DVec3; 3]) {
+        let (u, v) = (b - a, c - a);
+        let (uu, vv, ww) = (
+            u.length_squared(),
+            v.length_squared(),
+            b.distance_squared(c),
+        );
+        let cross = u.cross(v);
+        let length = cross.length();
+        if length * length > uu * vv * 2.0_f64.powi(-60) {
+            let normal = cross / length;
+            self.normals[self.count] = normal;
+            self.count += 1;
+            self.sum += normal;
+        } else if length != 0.0 {
+            // A needle whose normal is uncertain, or NaN.
+            self.are_certain = false;
+        }
+        if a != b && b != c && c != a {
+            let longest = uu.max(vv).max(ww).sqrt();
             // The area's error, at most 2^-50 |u||v|, over the longest edge.
-            u.cross(v).length() / longest - longest * 2.0_f64.powi(-50)
-        })
-        .fold(f64::INFINITY, |min, h| if h >= min { min } else { h });
-    if min > 0.0 && min.is_finite() {
-        (min as f32).next_down().max(0.0)
-    } else {
-        0.0
+            let altitude = length / longest - longest * 2.0_f64.powi(-50);
+            // `f64::min` would lose a NaN.
+            self.altitude = if altitude >= self.altitude {
+                self.altitude
+            } else {
+                altitude
+            };
+        }
+    }
+
+    /// Axis and cosine of the half-angle of a cone about all face normals.
+    fn normal_cone(&self) -> ([f32; 3], f32) {
+        let everything = (DVec3::Z.as_vec3().to_array(), -1.0);
+        let Some(axis) = self.sum.try_normalize().filter(|_| self.are_certain) else {
+            return everything;
+        };
+        let axis = axis.as_vec3();
+        let cos = self.normals[..self.count]
+            .iter()
+            .map(|normal| normal.dot(axis.as_dvec3()))
+            .fold(1.0, f64::min);
+        let padded = ((cos - CONE_PADDING) as f32).next_down();
+        if padded.is_finite() && axis.is_finite() {
+            (axis.to_array(), padded.max(-1.0))
+        } else {
+            everything
+        }
+    }
+
+    /// A lower bound of the altitudes of all triangles with three different corners, 0 if there are none.
+    fn min_altitude(&self) -> f32 {
+        if self.altitude > 0.0 && self.altitude.is_finite() {
+            (self.altitude as f32).next_down().max(0.0)
+        } else {
+            0.0
+        }
     }
 }
 
