@@ -1,6 +1,6 @@
 //! The image an engine renders into.
 
-use super::target::{PIXEL_BYTES, Target};
+use super::target::{PIXEL_BYTES, Stamp, Target};
 
 /// An 8-bit RGBA image, rows from the top, sRGB encoded, opaque.
 #[derive(Clone, Debug)]
@@ -9,15 +9,6 @@ pub struct Frame {
     height: u32,
     pixels: Vec<[u8; 4]>,
     stamp: Option<Stamp>,
-}
-
-/// Which backend wrote a frame last, and when by that backend's own count of images.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stamp {
-    /// Identity of the writer, unique in the process.
-    pub writer: u64,
-    /// The writer's count when it wrote.
-    pub serial: u64,
 }
 
 impl Frame {

@@ -11,5 +11,5 @@ pub mod y4m;
 
 pub use frame::Frame;
 pub use png::SaveError;
-pub use target::{ChannelOrder, Target, TargetError};
+pub use target::{ChannelOrder, Stamp, Target, TargetError};
 pub use timing::{FrameRate, Timing};

@@ -5,8 +5,6 @@
 //!
 //! A target says what it holds already, and pixels that are right are not written again: see [`Target::with_age`].
 
-use super::frame::Stamp;
-
 /// Bytes of a pixel.
 pub const PIXEL_BYTES: usize = 4;
 
@@ -48,6 +46,15 @@ pub enum TargetError {
         /// Bytes there are.
         bytes: usize,
     },
+}
+
+/// Which image somebody holds: which backend wrote it, and when by that backend's own count of images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stamp {
+    /// Identity of the writer, unique in the process.
+    pub writer: u64,
+    /// The writer's count when it wrote.
+    pub serial: u64,
 }
 
 /// Memory that an image is handed over into.

@@ -31,8 +31,7 @@ mod visible;
 pub use tile::NO_TRIANGLE;
 
 use super::{Backend, BasePaint, Capabilities, Geometry, Patch, RasterCounts};
-use crate::output::Target;
-use crate::output::frame::Stamp;
+use crate::output::{Stamp, Target};
 use crate::parallel::Exec;
 use crate::simd::dispatch;
 use repaint::Job;

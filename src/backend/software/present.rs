@@ -4,9 +4,8 @@
 //! exactly the tiles that changed after its stamp, and any other target lacks all.
 
 use super::tile::{Grid, TILE_SIDE, Tile};
-use crate::output::frame::Stamp;
 use crate::output::target::PIXEL_BYTES;
-use crate::output::{ChannelOrder, Target};
+use crate::output::{ChannelOrder, Stamp, Target};
 use crate::parallel::Exec;
 
 /// Brings `target` from its own state to that of `now`. Returns the number of pixels written.
