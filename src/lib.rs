@@ -26,6 +26,7 @@ pub mod visibility;
 /// The vectors and matrices in this crate's interface.
 pub use glam;
 
+pub use backend::BackendKind;
 pub use frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
 pub use output::Frame;
 pub use scene::Scene;

@@ -716,3 +716,46 @@ fn a_film_whose_reader_goes_away_ends_quietly() {
     assert_eq!(text(&output.stderr), "");
     assert_eq!(files(directory.path()), ["film.ron"]);
 }
+
+#[test]
+fn the_backend_is_chosen_by_name() {
+    let directory = workplace();
+    let run = |arguments: &str| {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        specula(directory.path(), &arguments)
+    };
+    let output = run(
+        "render teapot.ron -o skia.png --backend skia --size 96x54 --frames 2 --work 2000000 --json --error",
+    );
+    assert_success(&output);
+    let frames = json_lines(&output);
+    assert_eq!(frames[0]["phong_pixels"], 0);
+    assert!(
+        frames[0]["leaves"].as_u64() > Some(0),
+        "it refines: {}",
+        frames[0]
+    );
+    assert!(directory.path().join("skia.png").exists());
+    let cases = [
+        (
+            "render teapot.ron -o x.png --backend skia --method phong",
+            "error: the method 'phong' needs a backend that shades single pixels, which this one does not\n",
+        ),
+        (
+            "sweep teapot.ron --backend skia --budgets 1",
+            "error: the method 'phong-area' needs a backend that shades single pixels, which this one does not\n",
+        ),
+        (
+            "sweep teapot.ron --backend skia --methods adaptive",
+            "error: fractions are of the time of Phong shading, which the backend 'skia' cannot do: give --budgets\n",
+        ),
+    ];
+    for (arguments, message) in cases {
+        let output = run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}");
+        assert_eq!(text(&output.stderr), message, "{arguments}");
+    }
+    assert_success(&run(
+        "sweep teapot.ron --backend skia --methods adaptive --budgets 1 --size 64x36",
+    ));
+}

@@ -455,7 +455,9 @@ fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
                         std::array::from_fn(|k| (0..3).map(|c| w[c] * corners[c][k]).sum())
                     };
                     match paint {
-                        BasePaint::Gouraud(colours) => mix(colours).map(f64::from),
+                        BasePaint::Gouraud(colours) | BasePaint::Refined { colours, .. } => {
+                            mix(colours).map(f64::from)
+                        }
                         BasePaint::Flat(colours) => colours.get(id as usize).map(f64::from),
                         BasePaint::Phong => {
                             let to_f64 = |v: [f32; 3]| glam::DVec3::from_array(v.map(f64::from));

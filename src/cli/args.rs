@@ -4,6 +4,7 @@ use super::animate::{Animate, time};
 use super::bench::Bench;
 use super::inspect::Inspect;
 use clap::{Args, Parser, Subcommand};
+use specula::BackendKind;
 use specula::frame::Method;
 use specula::geometry::screen::MAX_IMAGE_SIDE;
 use specula::simd::SimdLevel;
@@ -205,6 +206,10 @@ pub(super) struct Machine {
     /// Threads to use; as many as the machine has processors if not given
     #[arg(long, value_name = "N", value_parser = threads)]
     pub(super) threads: Option<usize>,
+
+    /// What draws: software, or skia (tiny-skia: refines first, then draws everything once)
+    #[arg(long, value_name = "NAME", default_value_t)]
+    pub(super) backend: BackendKind,
 
     /// SIMD level to use, such as scalar, sse2, avx2 or neon; the machine's strongest if not given
     #[arg(long, value_name = "LEVEL")]

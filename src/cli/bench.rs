@@ -91,6 +91,7 @@ pub(super) fn run(args: &Bench) -> Result<(), Failure> {
         views: args.views,
         repeats: args.repeat,
         compared_views: args.error,
+        backend: args.machine.backend,
         threads: args.machine.threads,
         simd: args.machine.simd,
         ..BenchOptions::default()

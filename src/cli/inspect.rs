@@ -94,6 +94,7 @@ pub(super) fn run(args: &Inspect) -> Result<(), Failure> {
     let scene = Scene::load(&args.scene)?;
     let options = EngineOptions {
         method: args.method,
+        backend: args.machine.backend,
         threads: args.machine.threads,
         simd: args.machine.simd,
         ..EngineOptions::default()

@@ -71,7 +71,10 @@ impl From<SaveError> for Failure {
 
 impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Self {
-        Self::runtime(error.to_string())
+        match error {
+            EngineError::NeedsPixels { .. } => Self::input(error.to_string()),
+            _ => Self::runtime(error.to_string()),
+        }
     }
 }
 

@@ -20,6 +20,7 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
     }
     let options = EngineOptions {
         method: args.method,
+        backend: args.machine.backend,
         threads: args.machine.threads,
         simd: args.machine.simd,
         ..EngineOptions::default()

@@ -26,9 +26,17 @@ pub(super) fn run(args: &Arguments) -> Result<(), Failure> {
         frames: args.frames,
         repeats: args.repeat,
         threads: args.machine.threads,
+        backend: args.machine.backend,
         simd: args.machine.simd,
         ..SweepOptions::default()
     };
+    let can_shade_pixels = options.backend.create().capabilities().per_pixel;
+    if args.budgets.is_empty() && !can_shade_pixels {
+        return Err(Failure::input(format!(
+            "fractions are of the time of Phong shading, which the backend '{}' cannot do: give --budgets",
+            options.backend
+        )));
+    }
     let mut report = Report {
         stdout: Output::new(),
         csv: args.csv.as_deref().map(Csv::create).transpose()?,

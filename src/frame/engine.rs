@@ -2,10 +2,10 @@
 
 use super::Method;
 use super::base::BaseImage;
+use super::refine_first::RefineFirst;
 use super::refinement::{Leaf, Refinement, for_each_leaf};
 use super::stats::{FrameStats, Outcome, StageTimes};
-use crate::backend::Backend;
-use crate::backend::software::SoftwareBackend;
+use crate::backend::{Backend, BackendKind};
 use crate::clock::{Clock, SystemClock};
 use crate::output::{Frame, Stamp, Target};
 use crate::parallel::Exec;
@@ -20,6 +20,8 @@ use std::sync::Arc;
 pub struct EngineOptions {
     /// How images are shaded.
     pub method: Method,
+    /// What draws them; [`Engine::with_backend`] takes one that is not among these.
+    pub backend: BackendKind,
     /// Threads to use; `None` for as many as the machine has processors. With one, everything happens on the caller's
     /// thread; with more, the engine owns a pool.
     pub threads: Option<usize>,
@@ -36,6 +38,7 @@ impl Default for EngineOptions {
     fn default() -> Self {
         Self {
             method: Method::default(),
+            backend: BackendKind::default(),
             threads: None,
             pool: None,
             simd: None,
@@ -54,6 +57,14 @@ pub enum EngineError {
     /// The SIMD level asked for is not one of this machine's.
     #[error("this machine does not have the SIMD level '{0}'")]
     NoSuchSimdLevel(SimdLevel),
+    /// The backend cannot shade per pixel, or not after the first image, which the method needs.
+    #[error(
+        "the method '{method}' needs a backend that shades single pixels, which this one does not"
+    )]
+    NeedsPixels {
+        /// The method.
+        method: Method,
+    },
     /// The threads could not be started.
     #[error("cannot start {threads} threads: {source}")]
     ThreadPool {
@@ -99,6 +110,8 @@ struct Renderer {
     is_lit: bool,
     base: BaseImage,
     refinement: Refinement,
+    /// For a backend that cannot repaint.
+    refine_first: RefineFirst,
     /// Time per pixel handed over to the caller.
     presenting: LearnedRate,
     frames: u64,
@@ -124,8 +137,26 @@ impl Engine {
     /// An engine with the given options.
     ///
     /// # Errors
-    /// When there are to be no threads, they cannot be started, or the machine lacks the SIMD level.
+    /// When there are to be no threads, they cannot be started, the machine lacks the SIMD level, or the backend cannot do
+    /// what the method needs.
     pub fn with_options(scene: &Scene, options: EngineOptions) -> Result<Self, EngineError> {
+        let backend = options.backend.create();
+        Self::with_backend(scene, options, backend)
+    }
+
+    /// As [`with_options`](Self::with_options), drawing with a backend of the caller's, whatever `options.backend` says.
+    ///
+    /// # Errors
+    /// As [`with_options`](Self::with_options).
+    pub fn with_backend(
+        scene: &Scene,
+        options: EngineOptions,
+        backend: Box<dyn Backend>,
+    ) -> Result<Self, EngineError> {
+        if !suits(options.method, &*backend) {
+            let method = options.method;
+            return Err(EngineError::NeedsPixels { method });
+        }
         let simd = options.simd.unwrap_or_else(SimdLevel::detect);
         let level = simd.token().ok_or(EngineError::NoSuchSimdLevel(simd))?;
         let pool = match options.pool {
@@ -143,10 +174,11 @@ impl Engine {
                 placement,
                 base: BaseImage::new(&world),
                 world,
-                backend: Box::new(SoftwareBackend::new()),
+                backend,
                 seen: None,
                 is_lit: false,
                 refinement: Refinement::default(),
+                refine_first: RefineFirst::default(),
                 presenting: LearnedRate::new(cost::PRESENT_PIXEL_NS, LEAST_PIXELS_TO_LEARN_FROM),
                 frames: 0,
                 handed_over: VecDeque::with_capacity(MOST_AGE),
@@ -156,10 +188,10 @@ impl Engine {
 
     /// Renders the scene from its camera into `frame`, within `budget`.
     ///
-    /// A still view is refined further from frame to frame, until it equals per-pixel Phong shading; then nothing is
-    /// drawn any more. After a change, what depends on it is done again: with other lights or materials, the owners of
-    /// all pixels stay known; with another camera or image size, the scene stays prepared; objects that move are
-    /// placed anew, and others are not.
+    /// A still view is refined further from frame to frame, until it equals per-pixel Phong shading (on a backend that
+    /// cannot shade pixels: until the estimate says half a code); then nothing is drawn any more. After a change, what depends on
+    /// it is done again: with other lights or materials, the owners of all pixels stay known; with another camera or
+    /// image size, the scene stays prepared; objects that move are placed anew, and others are not.
     ///
     /// It never fails: a scene is validated when it is made.
     pub fn render(&mut self, scene: &Scene, budget: Budget, frame: &mut Frame) -> FrameStats {
@@ -236,6 +268,16 @@ fn own_pool(threads: Option<usize>) -> Result<Option<Arc<rayon::ThreadPool>>, En
     }
 }
 
+/// Whether the backend can do what the method needs.
+fn suits(method: Method, backend: &dyn Backend) -> bool {
+    let capabilities = backend.capabilities();
+    match method {
+        Method::Flat | Method::Gouraud | Method::Adaptive => true,
+        Method::Phong => capabilities.per_pixel,
+        Method::PhongArea => capabilities.refines_in_place(),
+    }
+}
+
 impl Renderer {
     /// One frame: draw the first image if there is none, refine it while the budget lasts, hand it over.
     fn render(
@@ -262,11 +304,13 @@ impl Renderer {
         }
 
         let refining_since = allowance.elapsed_ms();
+        let mut drawing_ms = 0.0;
         if self.method.is_progressive() {
-            self.refine(exec, &view, &mut allowance, target);
+            drawing_ms = self.refine(exec, &view, &mut allowance, target);
         }
         let presenting_since = allowance.elapsed_ms();
-        stages.refine += presenting_since - refining_since;
+        stages.refine += presenting_since - refining_since - drawing_ms;
+        stages.resolve += drawing_ms;
 
         let pixels_written = self.backend.present(exec, target);
         self.handed_over.truncate(MOST_AGE - 1);
@@ -276,7 +320,9 @@ impl Renderer {
         self.presenting
             .learn(pixels_written, frame_ms - presenting_since);
 
-        let converged = !self.method.is_progressive() || self.refinement.is_finished();
+        let converged = !self.method.is_progressive()
+            || (self.refinement.is_finished()
+                && (!self.refines_first() || self.refine_first.is_up_to_date(&self.refinement)));
         let mut stats = FrameStats {
             frame: self.frames + 1,
             frame_ms,
@@ -352,6 +398,7 @@ impl Renderer {
         allowance: &Allowance<'_>,
         stages: &mut StageTimes,
     ) {
+        let refines_first = self.refines_first();
         let backend = &mut *self.backend;
         let mut since = allowance.elapsed_ms();
         let mut lap = |stage: &mut f64| {
@@ -365,8 +412,13 @@ impl Renderer {
             .shade(exec, self.method, &self.world, view, backend);
         lap(&mut stages.shade);
 
-        self.base
-            .resolve(exec, self.method, &self.world, view, backend);
+        // On a backend that cannot repaint, refinement comes first.
+        if refines_first {
+            self.refine_first.begin();
+        } else {
+            self.base
+                .resolve(exec, self.method, &self.world, view, backend);
+        }
         lap(&mut stages.resolve);
 
         // Which triangles can hold a highlight, and what is worth refining?
@@ -388,14 +440,21 @@ impl Renderer {
         self.is_lit = true;
     }
 
-    /// Spends what is left of the budget, less what handing the image over will take.
+    /// Whether everything is drawn once, after refinement.
+    fn refines_first(&self) -> bool {
+        self.method.is_progressive() && !self.backend.capabilities().refines_in_place()
+    }
+
+    /// Spends what is left of the budget, less what handing the image over will take. Returns the milliseconds that drawing
+    /// took, where that comes after refinement.
     fn refine(
         &mut self,
         exec: Exec,
         view: &View,
         allowance: &mut Allowance<'_>,
         target: &Target<'_>,
-    ) {
+    ) -> f64 {
+        let refines_first = self.refines_first();
         let mut stage = super::refinement::Stage {
             exec,
             world: &self.world,
@@ -403,11 +462,21 @@ impl Renderer {
             base: &self.base,
             backend: &mut *self.backend,
         };
+        if refines_first {
+            let pixels = u64::from(view.width) * u64::from(view.height);
+            let presenting_ms = self.presenting.predict_ms(pixels);
+            return self.refine_first.frame(
+                &mut self.refinement,
+                &mut stage,
+                allowance,
+                presenting_ms,
+            );
+        }
         loop {
             let pending = stage.backend.pending_pixels(target);
             allowance.reserve_ms(self.presenting.predict_ms(pending));
             if !self.refinement.step(&mut stage, allowance) {
-                break;
+                return 0.0;
             }
         }
     }

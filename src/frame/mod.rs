@@ -1,11 +1,12 @@
 //! The engine: the one place that knows all stages.
 //!
 //! `engine.rs` holds the frame loop. Read it first; it says what happens in a frame and in which order. `base.rs` draws
-//! the first image, `refinement/` makes it better.
+//! the first image, `refinement/` makes it better; `refine_first.rs` is how, where the backend cannot repaint.
 
 mod base;
 mod engine;
 mod method;
+mod refine_first;
 mod refinement;
 mod stats;
 

@@ -9,6 +9,7 @@ pub mod polygon;
 pub mod screen;
 pub mod shapes;
 pub mod topology;
+pub mod viewport;
 
 pub use bary::Bary;
 pub use clusters::{Cluster, build_clusters};

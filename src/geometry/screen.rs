@@ -269,9 +269,21 @@ impl TrianglePlanes {
     /// The edge planes at the centre of pixel `(x, y)`, turned so that they are positive inside.
     #[must_use]
     pub fn edges_at_pixel(&self, x: i32, y: i32) -> [f64; 3] {
-        let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+        self.edges_at(f64::from(x) + 0.5, f64::from(y) + 0.5)
+    }
+
+    /// The edge planes at a point of the screen, turned so that they are positive inside.
+    #[must_use]
+    pub fn edges_at(&self, x: f64, y: f64) -> [f64; 3] {
         let sign = if self.determinant < 0.0 { -1.0 } else { 1.0 };
         self.edges.map(|e| (e[0] * x + e[1] * y + e[2]) * sign)
+    }
+
+    /// Whether the triangle turns its front to the viewer: positive if it does, negative if it shows its back, zero if it
+    /// is seen edge-on; NaN if a coordinate is.
+    #[must_use]
+    pub fn facing(&self) -> f64 {
+        -self.determinant
     }
 
     /// The depth plane about `anchor`, the top left pixel of the triangle's [`PixelBox`]. Depth is `z / w`, linear on the

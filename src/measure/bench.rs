@@ -15,6 +15,7 @@
 
 use super::metrics::ErrorHistogram;
 use super::reference::ReferenceImage;
+use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
 use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
 use crate::output::Frame;
@@ -45,6 +46,8 @@ pub struct BenchOptions {
     pub compared_views: u32,
     /// Threads; `None` for as many as the machine has processors.
     pub threads: Option<usize>,
+    /// What draws.
+    pub backend: BackendKind,
     /// SIMD level; `None` for the machine's strongest.
     pub simd: Option<SimdLevel>,
     /// Where time comes from.
@@ -62,6 +65,7 @@ impl Default for BenchOptions {
             repeats: 1,
             compared_views: 4,
             threads: None,
+            backend: BackendKind::default(),
             simd: None,
             clock: Arc::new(SystemClock::new()),
         }
@@ -191,6 +195,7 @@ pub fn bench(
         EngineOptions {
             method: options.method,
             threads: options.threads,
+            backend: options.backend,
             simd: options.simd,
             clock: Arc::clone(&options.clock),
             ..EngineOptions::default()

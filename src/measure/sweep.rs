@@ -11,6 +11,7 @@
 //! an even number, the faster of the two in the middle).
 
 use super::{ErrorReport, ReferenceImage};
+use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
 use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
 use crate::output::Frame;
@@ -38,6 +39,8 @@ pub struct SweepOptions {
     pub calibration_frames: u32,
     /// Threads; `None` for as many as the machine has processors.
     pub threads: Option<usize>,
+    /// What draws.
+    pub backend: BackendKind,
     /// SIMD level; `None` for the machine's strongest.
     pub simd: Option<SimdLevel>,
     /// Where time comes from.
@@ -54,6 +57,7 @@ impl Default for SweepOptions {
             repeats: 1,
             calibration_frames: 30,
             threads: None,
+            backend: BackendKind::default(),
             simd: None,
             clock: Arc::new(SystemClock::new()),
         }
@@ -66,6 +70,7 @@ impl SweepOptions {
             scene,
             EngineOptions {
                 method,
+                backend: self.backend,
                 threads: self.threads,
                 simd: self.simd,
                 clock: Arc::clone(&self.clock),

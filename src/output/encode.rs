@@ -9,7 +9,7 @@
 //! most 0.0005 codes). The error against the reference is below [`LANES_ERROR`] codes, with and without fused
 //! multiply-add.
 
-use crate::simd::Simd;
+use crate::simd::{Level, Simd, dispatch};
 use fearless_simd::prelude::*;
 
 /// Linear light up to which the curve is a straight line.
@@ -56,6 +56,23 @@ pub fn encode_u8(linear: f64) -> u8 {
 #[inline(always)]
 pub fn encode_codes_lanes<S: Simd>(simd: S, linear: S::f32s) -> S::f32s {
     shifted_codes(simd, linear, 0.0).min(S::f32s::splat(simd, 255.0))
+}
+
+/// The codes, in `0..=255` and not rounded, of all of `linear`; `codes` has the same length.
+pub fn encode_codes(level: Level, linear: &[f32], codes: &mut [f32]) {
+    dispatch!(level, simd => encode_codes_slice(simd, linear, codes));
+}
+
+#[inline(always)]
+fn encode_codes_slice<S: Simd>(simd: S, linear: &[f32], codes: &mut [f32]) {
+    let lanes = S::f32s::LEN;
+    for (linear, codes) in linear.chunks(lanes).zip(codes.chunks_mut(lanes)) {
+        let count = linear.len().min(codes.len());
+        let mut vector = S::f32s::splat(simd, 0.0);
+        vector.as_mut_slice()[..count].copy_from_slice(&linear[..count]);
+        let encoded = encode_codes_lanes(simd, vector);
+        codes[..count].copy_from_slice(&encoded.as_slice()[..count]);
+    }
 }
 
 /// The codes of linear light plus `shift`; of full light, up to 0.01 more.
@@ -108,7 +125,7 @@ fn byte_lanes<S: Simd>(simd: S, linear: S::f32s) -> S::u32s {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::{Level, SimdLevel, dispatch};
+    use crate::simd::SimdLevel;
 
     #[inline(always)]
     fn codes_of<S: Simd>(simd: S, xs: &[f32], codes: &mut [f32], pixels: &mut [u32]) {
@@ -174,6 +191,20 @@ mod tests {
                 }
             }
             assert!(worst < LANES_ERROR, "{level}: error {worst}");
+        }
+    }
+
+    #[test]
+    fn slices_of_any_length_are_encoded_as_single_lanes_are() {
+        let xs = inputs();
+        for level in SimdLevel::available() {
+            let token = level.token().expect("available");
+            let (want, _) = run(token, &xs[..100]);
+            for len in [0, 1, 3, 16, 17, 100] {
+                let mut codes = vec![-1.0; len];
+                encode_codes(token, &xs[..len], &mut codes);
+                assert_eq!(codes, want[..len], "{level}");
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 pub mod apng;
 pub mod encode;
 pub mod frame;
+mod interpolation;
 pub mod png;
 pub mod sequence;
 pub mod target;
@@ -10,6 +11,7 @@ pub mod timing;
 pub mod y4m;
 
 pub use frame::Frame;
+pub use interpolation::Interpolation;
 pub use png::SaveError;
 pub use target::{ChannelOrder, Stamp, Target, TargetError};
 pub use timing::{FrameRate, Timing};

@@ -14,6 +14,7 @@
 
 use crate::geometry::Vec3s;
 use crate::illumination::PointBatch;
+use crate::output::Interpolation;
 use crate::output::encode::encode_codes_lanes;
 use crate::parallel::Exec;
 use crate::scene::{Eye, World};
@@ -36,6 +37,8 @@ pub const SAMPLES_AT_ONCE: usize = 2048;
 /// Points that are illuminated to be compared with interpolated colours.
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
+    /// Interpolated colours are linear, or codes.
+    interpolation: Interpolation,
     batch: PointBatch,
     colours: Vec3s,
     interpolated: Vec3s,
@@ -43,6 +46,11 @@ pub struct Samples {
 }
 
 impl Samples {
+    /// Says how colours are interpolated, for samples added from now on: as linear light (the default), or as codes.
+    pub(super) fn set_interpolation(&mut self, interpolation: Interpolation) {
+        self.interpolation = interpolation;
+    }
+
     /// Removes all samples and keeps the memory.
     pub fn clear(&mut self) {
         self.batch.clear();
@@ -75,7 +83,7 @@ impl Samples {
         self.batch.is_empty()
     }
 
-    /// Adds a point with its (unnormalized) normal, its material and the linear colour interpolation gives there.
+    /// Adds a point with its (unnormalized) normal, its material and the colour interpolation gives there.
     pub fn push(
         &mut self,
         point: [f32; 3],
@@ -98,6 +106,7 @@ impl Samples {
             exec.level,
             &self.colours,
             &self.interpolated,
+            self.interpolation,
             &mut self.deviation,
         );
     }
@@ -115,18 +124,31 @@ impl Samples {
     }
 }
 
-/// `encode(colours) - encode(interpolated)` in codes.
-pub fn deviations(level: Level, colours: &Vec3s, interpolated: &Vec3s, out: &mut Vec3s) {
+/// The codes of linear `colours` less those of `interpolated`, which are linear, or codes already.
+pub fn deviations(
+    level: Level,
+    colours: &Vec3s,
+    interpolated: &Vec3s,
+    interpolation: Interpolation,
+    out: &mut Vec3s,
+) {
     out.resize(colours.len());
+    let is_encoded = interpolation == Interpolation::EncodedAffine;
     dispatch!(level, simd => {
-        channel_deviations(simd, &colours.x, &interpolated.x, &mut out.x);
-        channel_deviations(simd, &colours.y, &interpolated.y, &mut out.y);
-        channel_deviations(simd, &colours.z, &interpolated.z, &mut out.z);
+        channel_deviations(simd, &colours.x, &interpolated.x, is_encoded, &mut out.x);
+        channel_deviations(simd, &colours.y, &interpolated.y, is_encoded, &mut out.y);
+        channel_deviations(simd, &colours.z, &interpolated.z, is_encoded, &mut out.z);
     });
 }
 
 #[inline(always)]
-fn channel_deviations<S: Simd>(simd: S, colours: &[f32], interpolated: &[f32], out: &mut [f32]) {
+fn channel_deviations<S: Simd>(
+    simd: S,
+    colours: &[f32],
+    interpolated: &[f32],
+    is_encoded: bool,
+    out: &mut [f32],
+) {
     let lanes = S::f32s::LEN;
     let mut done = 0;
     while done < out.len() {
@@ -136,8 +158,13 @@ fn channel_deviations<S: Simd>(simd: S, colours: &[f32], interpolated: &[f32], o
             vector.as_mut_slice()[..count].copy_from_slice(&from[done..done + count]);
             vector
         };
-        let difference =
-            encode_codes_lanes(simd, load(colours)) - encode_codes_lanes(simd, load(interpolated));
+        let shown = load(interpolated);
+        let shown = if is_encoded {
+            shown
+        } else {
+            encode_codes_lanes(simd, shown)
+        };
+        let difference = encode_codes_lanes(simd, load(colours)) - shown;
         out[done..done + count].copy_from_slice(&difference.as_slice()[..count]);
         done += count;
     }

@@ -1,12 +1,15 @@
 //! The leaves of all subdivided triangles, and which leaves meet at an edge.
 
 use super::estimate::{self, SAMPLES_AT_ONCE, Samples};
+use super::shown::Shown;
 use super::split::{CHILDREN_AT_ONCE, Planner};
 use super::vertices::VertexPool;
 use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
+use crate::output::Interpolation;
 use crate::parallel::Exec;
-use crate::scene::{Eye, World};
+use crate::scene::{Eye, View, World};
+use crate::simd::Level;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -23,6 +26,9 @@ pub(super) const MAX_LEAVES: usize = 1 << 18;
 /// Leaves that there is room for from the start, lest moving views make every list grow again and again. To make so many takes
 /// longer than a frame of an animation lasts; only a view that stays refines further.
 pub const FIRST_LEAVES: usize = 1 << 13;
+
+/// How many times more densely leaves are sampled that are drawn once.
+const DENSER: u32 = 4;
 
 /// What has become of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +50,7 @@ pub struct Leaf {
     pub corners: [Bary; 3],
     /// Vertices at the corners, for [`Forest::colours`].
     pub vertices: [u32; 3],
-    /// How many visible pixels it has.
+    /// How many visible pixels it has; of an image that is [drawn once](Forest::draw_once), an estimate.
     pub pixels: u32,
     /// Estimated mean squared error in squared codes; see [`estimate`].
     pub error: f32,
@@ -52,7 +58,7 @@ pub struct Leaf {
     pub spread: f32,
     /// What has become of it.
     pub state: LeafState,
-    /// False when a split was found not to help.
+    /// False when a split was found not to help. One that is asked for nevertheless is carried out.
     pub splittable: bool,
     /// Vertices in the middle of edge k, from corner k to corner k + 1; `NONE` where the barycentric grid ends.
     pub(super) midpoints: [u32; 3],
@@ -89,6 +95,8 @@ pub struct Forest {
     edges: FxHashMap<[u32; 2], u32>,
     planted: FxHashMap<u32, LeafId>,
     open: usize,
+    /// What will be shown, if that is drawn once.
+    pub(super) shown: Option<Shown>,
 }
 
 impl Forest {
@@ -108,6 +116,61 @@ impl Forest {
         self.edges.reserve(2 * FIRST_LEAVES);
         self.planted.reserve(FIRST_LEAVES);
         self.fresh.reserve(CHILDREN_AT_ONCE);
+        self.shown = None;
+        self.samples.set_interpolation(Interpolation::default());
+    }
+
+    /// Says, after [`reset`](Self::reset), that the image will be drawn once, by a device that interpolates so and neither
+    /// counts pixels nor shades them: errors are measured against what it will show, pixels are estimated by area
+    /// inside the image, large leaves are sampled more densely because nothing else will look into them, and a split that did not
+    /// help is carried out when it is asked for again.
+    pub fn draw_once(
+        &mut self,
+        level: Level,
+        view: &View,
+        interpolation: Interpolation,
+        base_colours: &Vec3s,
+    ) {
+        let shown = Shown {
+            view: *view,
+            interpolation,
+        };
+        if shown.is_encoded() {
+            self.vertices.encode_base(level, base_colours);
+        }
+        self.samples.set_interpolation(interpolation);
+        self.shown = Some(shown);
+    }
+
+    /// How many triangles were ever made leaves.
+    #[must_use]
+    pub fn planted_roots(&self) -> usize {
+        self.planted.len()
+    }
+
+    /// Positions of the leaf's corners in world space.
+    #[must_use]
+    pub fn positions(&self, world: &World, id: LeafId) -> [[f32; 3]; 3] {
+        self.leaves[id as usize]
+            .vertices
+            .map(|v| self.vertices.position(world, v))
+    }
+
+    /// The longest edge of a leaf on the screen, in pixels, for an image that is [drawn once](Self::draw_once); zero when
+    /// nothing of it is inside the image.
+    #[must_use]
+    pub fn longest_edge_px(&self, world: &World, id: LeafId) -> f32 {
+        let shown = self.shown.as_ref();
+        shown.map_or(0.0, |shown| shown.longest_edge(self.positions(world, id)))
+    }
+
+    /// How many points inside a leaf of `pixels` pixels are sampled.
+    #[must_use]
+    pub fn sample_count(&self, pixels: u32) -> usize {
+        estimate::sample_count(match self.shown {
+            Some(_) => pixels.saturating_mul(DENSER),
+            None => pixels,
+        })
     }
 
     /// A leaf.
@@ -192,7 +255,8 @@ impl Forest {
         base_colours: &Vec3s,
         planted: &mut Vec<LeafId>,
     ) {
-        self.vertices.illuminate(exec, world, eye, base_colours);
+        self.vertices
+            .illuminate(exec, world, eye, base_colours, self.shown.as_ref());
         self.samples.illuminate(exec, world, eye);
         let mut fresh = std::mem::take(&mut self.fresh);
         for (id, samples) in fresh.drain(..) {
@@ -203,7 +267,7 @@ impl Forest {
             planted.push(id);
         }
         self.fresh = fresh;
-        self.estimate_planned(exec, base_colours);
+        self.estimate_planned(exec, world, base_colours);
         self.samples.clear();
     }
 
@@ -219,7 +283,7 @@ impl Forest {
         self.leaves[id as usize].error = 0.0;
     }
 
-    /// Notes that splitting the leaf does not help, and what its error was found to be.
+    /// Notes that splitting the leaf does not help, or not right away, and what its error was found to be.
     pub fn forbid_splitting(&mut self, id: LeafId, error: f32) {
         let leaf = &mut self.leaves[id as usize];
         leaf.splittable = false;
@@ -282,17 +346,38 @@ impl Forest {
         let first = self.samples.len();
         let positions = leaf.vertices.map(|v| self.vertices.position(world, v));
         let normals = leaf.vertices.map(|v| self.vertices.normal(world, v));
-        let colours = leaf.vertices.map(|v| self.vertices.colour(base_colours, v));
-        for index in 0..estimate::sample_count(leaf.pixels as u32) {
+        let colours = self.shown_colours(base_colours, leaf.vertices);
+        for index in 0..self.sample_count(leaf.pixels as u32) {
             let weights = estimate::sample_weights(index);
             self.samples.push(
                 blend(weights, positions),
                 blend(weights, normals),
                 material,
-                blend(weights, colours),
+                self.shown_blend(weights, positions, colours),
             );
         }
         leaf.samples = first..self.samples.len();
+    }
+
+    /// Colours of vertices as they are interpolated.
+    pub(super) fn shown_colours(&self, base_colours: &Vec3s, vertices: [u32; 3]) -> [[f32; 3]; 3] {
+        vertices.map(|v| {
+            self.vertices
+                .shown_colour(self.shown.as_ref(), base_colours, v)
+        })
+    }
+
+    /// What is shown at a point inside a triangle, by its barycentric coordinates and the colours that are interpolated.
+    pub(super) fn shown_blend(
+        &self,
+        weights: [f32; 3],
+        corners: [[f32; 3]; 3],
+        colours: [[f32; 3]; 3],
+    ) -> [f32; 3] {
+        match &self.shown {
+            Some(shown) => shown.blend(weights, corners, colours),
+            None => blend(weights, colours),
+        }
     }
 
     /// Error of a leaf by the surplus at its edges and the deviations at its samples.

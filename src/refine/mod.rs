@@ -21,10 +21,15 @@
 //!   of the children is below that of the parents *at the same points* is it [committed](Forest::conclude_splits).
 //!
 //! Leaves that have been shaded per pixel are [closed](Forest::close): they are right already, so their edges no longer
-//! count, nor do those of triangles without a visible pixel. A backend without ids has neither, and needs both to follow.
+//! count, nor do those of triangles without a visible pixel.
+//!
+//! **Drawn once.** On a backend without ids there is no repainting: everything is drawn after it has been refined
+//! ([`Forest::draw_once`]). Nothing is closed there, and every triangle that is drawn follows its neighbours' splits, so that
+//! no T-junction can become a crack.
 
 pub mod estimate;
 mod forest;
+mod shown;
 mod split;
 mod vertices;
 

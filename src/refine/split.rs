@@ -4,6 +4,7 @@ use super::estimate::{SAMPLES_AT_ONCE, deviations, mean_square};
 use super::forest::{Forest, LeafError, LeafId, LeafState, NONE, Seedling};
 use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
+use crate::output::Interpolation;
 use crate::parallel::Exec;
 use crate::scene::World;
 use std::ops::Range;
@@ -50,6 +51,17 @@ pub enum SplitOutcome {
         /// What the leaf's error was found to be on the way.
         error: f32,
     },
+}
+
+/// What planting the roots on the other side of some edges has come to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Neighbours {
+    /// There is nothing to plant.
+    Ready,
+    /// Some were: their midpoints have to be illuminated first.
+    Planted,
+    /// The forest is full. An edge that not all sides can follow must not be split.
+    NoRoom,
 }
 
 /// A child of a planned split.
@@ -131,8 +143,10 @@ impl Forest {
         if self.leaves[leaf as usize].busy {
             return PlanOutcome::Later;
         }
-        if self.plant_neighbours(world, base_colours, leaf, marks, visible_pixels) {
-            return PlanOutcome::Later;
+        match self.plant_neighbours(world, base_colours, leaf, marks, visible_pixels) {
+            Neighbours::Ready => {}
+            Neighbours::Planted => return PlanOutcome::Later,
+            Neighbours::NoRoom => return PlanOutcome::Never,
         }
         let first_parent = self.planner.parents.len();
         let verdict = self.gather_parents(world, leaf, marks, first_parent);
@@ -176,7 +190,9 @@ impl Forest {
                     .map(|child| child.seedling.pixels * error(child))
                     .sum::<f32>()
             };
-            if total(|child| child.error.mean_square) >= total(|child| child.parent_error) {
+            let helps = total(|child| child.error.mean_square) < total(|child| child.parent_error);
+            // Who asks again for what did not help means it: there is nothing else to be done about the leaf.
+            if !helps && self.leaves[split.initiator as usize].splittable {
                 outcomes.push(SplitOutcome::Rejected {
                     leaf: split.initiator,
                     error: error_found(split.initiator, children),
@@ -210,8 +226,7 @@ impl Forest {
         self.planner.concluded[index]
     }
 
-    /// Plants the visible roots on the other side of the marked edges, as far as those are edges of the root. True when
-    /// there were any: their midpoints have to be illuminated first.
+    /// Plants the visible roots on the other side of the marked edges, as far as those are edges of the root.
     fn plant_neighbours(
         &mut self,
         world: &World,
@@ -219,12 +234,12 @@ impl Forest {
         leaf: LeafId,
         marks: u8,
         visible_pixels: impl Fn(u32) -> u32,
-    ) -> bool {
+    ) -> Neighbours {
         let (triangle, corners) = {
             let leaf = self.leaf(leaf);
             (leaf.triangle, leaf.corners)
         };
-        let mut any = false;
+        let mut neighbours = Neighbours::Ready;
         for k in (0..3).filter(|k| marks >> k & 1 == 1) {
             let ends = [corners[k], corners[(k + 1) % 3]];
             let Some(side) = (0..3).find(|&i| ends == [Bary::ROOT[i], Bary::ROOT[(i + 1) % 3]])
@@ -234,12 +249,16 @@ impl Forest {
             for half_edge in world.topology.ring(triangle * 3 + side as u32) {
                 let neighbour = half_edge / 3;
                 let pixels = visible_pixels(neighbour);
-                if pixels > 0 && !self.is_planted(neighbour) {
-                    any |= self.plant(world, base_colours, neighbour, pixels).is_some();
+                if pixels == 0 || self.is_planted(neighbour) {
+                    continue;
                 }
+                if self.plant(world, base_colours, neighbour, pixels).is_none() {
+                    return Neighbours::NoRoom;
+                }
+                neighbours = Neighbours::Planted;
             }
         }
-        any
+        neighbours
     }
 
     /// Collects the leaf and all others at its marked edges, with their marks.
@@ -299,12 +318,17 @@ impl Forest {
         let whole = Bary::doubled_area(leaf.corners) as f32;
         for points in template(marks, distance).into_iter().flatten() {
             let corners = points.map(corner);
+            let vertices = points.map(vertex);
+            let pixels = match &self.shown {
+                Some(shown) => shown.pixels(vertices.map(|v| self.vertices.position(world, v))),
+                None => leaf.pixels as f32 * (Bary::doubled_area(corners) as f32 / whole),
+            };
             let mut seedling = Seedling {
                 triangle: leaf.triangle,
                 corners,
-                vertices: points.map(vertex),
+                vertices,
                 midpoints: [NONE; 3],
-                pixels: leaf.pixels as f32 * (Bary::doubled_area(corners) as f32 / whole),
+                pixels,
                 samples: 0..0,
             };
             self.prepare(world, base_colours, &mut seedling);
@@ -319,19 +343,22 @@ impl Forest {
     }
 
     /// Estimates the errors of all planned children, and of their parents at the same points.
-    pub(super) fn estimate_planned(&mut self, exec: Exec, base_colours: &Vec3s) {
+    pub(super) fn estimate_planned(&mut self, exec: Exec, world: &World, base_colours: &Vec3s) {
         let mut planner = std::mem::take(&mut self.planner);
         planner.check_colours.clear();
         planner.check_interpolated.clear();
         for child in &planner.children {
-            let parent_colours = self.colours(base_colours, child.parent);
+            let parent_colours = self.shown_colours(base_colours, self.leaf(child.parent).vertices);
+            let parent_corners = self.positions(world, child.parent);
             let corners = child.points.map(|point| POINTS[point]);
             let mut check = |weights: [f32; 3], colour: [f32; 3]| {
                 planner.check_colours.push(colour);
                 let in_parent = blend(weights, corners);
-                planner
-                    .check_interpolated
-                    .push(blend(in_parent, parent_colours));
+                planner.check_interpolated.push(self.shown_blend(
+                    in_parent,
+                    parent_corners,
+                    parent_colours,
+                ));
             };
             for k in 0..3 {
                 let vertex = child.seedling.midpoints[k];
@@ -355,6 +382,8 @@ impl Forest {
             exec.level,
             &planner.check_colours,
             &planner.check_interpolated,
+            self.shown
+                .map_or_else(Interpolation::default, |shown| shown.interpolation),
             &mut planner.check_deviation,
         );
         let mut next = 0;

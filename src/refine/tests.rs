@@ -288,3 +288,72 @@ fn a_leaf_is_not_split_before_its_midpoints_are_illuminated() {
     let outcome = forest.plan_split(&world, &colours, root, 7, |_| 10);
     assert_eq!(outcome, PlanOutcome::Planned);
 }
+
+#[test]
+fn asked_again_a_split_that_does_not_help_is_carried_out() {
+    // A matte plane under distant light has one colour: no split helps.
+    let mut world = world_of(&shapes::plane(1.0, 1.0, 1, 1));
+    world.materials[0].specular = [0.0; 3];
+    world.lights[0].is_point = false;
+    let colours = base_colours(&world);
+    let mut forest = Forest::default();
+    forest.reset(&world);
+    let (mut planted, mut outcomes) = (Vec::new(), Vec::new());
+    let root = forest
+        .plant(&world, &colours, 0, 10)
+        .expect("there is room");
+    let mut split = |forest: &mut Forest| {
+        outcomes.clear();
+        loop {
+            let plan = forest.plan_split(&world, &colours, root, 7, |_| 10);
+            forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+            if plan == PlanOutcome::Planned {
+                break;
+            }
+        }
+        forest.conclude_splits(&world, &mut outcomes);
+        outcomes.pop().expect("one split was planned")
+    };
+    let first = split(&mut forest);
+    let SplitOutcome::Rejected { leaf, error } = first else {
+        panic!("{first:?}");
+    };
+    assert_eq!(leaf, root);
+    forest.forbid_splitting(leaf, error);
+    let second = split(&mut forest);
+    assert!(
+        matches!(second, SplitOutcome::Committed { .. }),
+        "{second:?}"
+    );
+}
+
+#[test]
+fn an_edge_is_not_split_when_its_other_side_has_no_room_to_follow() {
+    // Each triangle is alone but for the two of the last square.
+    let mesh = shapes::plane(1.0, 1.0, 1, 1);
+    let mut world = world_of(&mesh);
+    let [a, b] = [mesh.triangles[0], mesh.triangles[1]];
+    let copies = super::forest::MAX_LEAVES - 1;
+    for copy in 0..copies as u32 - 1 {
+        // Without length on any edge, so that it has no neighbours.
+        world.triangles.push([copy % 4; 3]);
+        world.triangle_material.push(0);
+    }
+    assert_eq!(world.triangles[..2], [a, b]);
+    world.topology = Topology::new(&world.positions, &world.triangles);
+    let colours = base_colours(&world);
+    let mut forest = Forest::default();
+    forest.reset(&world);
+    let root = forest.plant(&world, &colours, 0, 10).expect("room");
+    for triangle in 2..world.triangles.len() as u32 {
+        assert!(forest.plant(&world, &colours, triangle, 0).is_some());
+    }
+    // One place is left, and nobody to take it but a triangle that is not the neighbour.
+    world.triangles.push([0; 3]);
+    world.triangle_material.push(0);
+    forest.plant(&world, &colours, copies as u32 + 1, 0);
+    forest.illuminate(exec(), &world, EYE, &colours, &mut Vec::new());
+    let outcome = forest.plan_split(&world, &colours, root, 7, |_| 10);
+    assert_eq!(outcome, PlanOutcome::Never);
+    assert!(!forest.is_planted(1), "the forest is full");
+}

@@ -5,9 +5,12 @@
 
 use super::estimate::{SAMPLES_AT_ONCE, Samples};
 use super::forest::FIRST_LEAVES;
+use super::shown::Shown;
 use crate::geometry::Vec3s;
+use crate::output::encode::encode_codes;
 use crate::parallel::Exec;
 use crate::scene::{Eye, World};
+use crate::simd::Level;
 use rustc_hash::FxHashMap;
 
 /// Colour, linear RGB.
@@ -23,6 +26,10 @@ pub(super) struct VertexPool {
     positions: Vec3s,
     normals: Vec3s,
     colours: Vec3s,
+    /// The colours' codes, if those are what is interpolated.
+    codes: Vec3s,
+    /// The same of the world's own vertices.
+    base_codes: Vec3s,
     /// Encoded colour less encoded interpolated colour of the parents, in codes.
     surplus: Vec3s,
     material: Vec<u16>,
@@ -44,6 +51,8 @@ impl VertexPool {
             &mut self.positions,
             &mut self.normals,
             &mut self.colours,
+            &mut self.codes,
+            &mut self.base_codes,
             &mut self.surplus,
         ] {
             array.clear();
@@ -103,6 +112,27 @@ impl VertexPool {
         }
     }
 
+    /// Encodes the colours of the world's own vertices.
+    pub(super) fn encode_base(&mut self, level: Level, base_colours: &Vec3s) {
+        encode_all(level, base_colours, 0, &mut self.base_codes);
+    }
+
+    /// A vertex's colour as it is interpolated.
+    pub(super) fn shown_colour(
+        &self,
+        shown: Option<&Shown>,
+        base_colours: &Vec3s,
+        vertex: u32,
+    ) -> Colour {
+        if !shown.is_some_and(Shown::is_encoded) {
+            return self.colour(base_colours, vertex);
+        }
+        match self.index(vertex) {
+            Some(index) => self.codes.get(index),
+            None => self.base_codes.get(vertex as usize),
+        }
+    }
+
     /// Surplus of a midpoint over its parents; the world's own vertices have none.
     pub(super) fn surplus(&self, vertex: u32) -> [f32; 3] {
         self.index(vertex)
@@ -150,25 +180,62 @@ impl VertexPool {
     }
 
     /// Illuminates the vertices made since the last call, and finds their surplus.
-    pub(super) fn illuminate(&mut self, exec: Exec, world: &World, eye: Eye, base_colours: &Vec3s) {
+    pub(super) fn illuminate(
+        &mut self,
+        exec: Exec,
+        world: &World,
+        eye: Eye,
+        base_colours: &Vec3s,
+        shown: Option<&Shown>,
+    ) {
         let range = self.lit..self.positions.len();
         self.lit = range.end;
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.clear();
+        scratch.set_interpolation(shown.map_or_else(Default::default, |shown| shown.interpolation));
         for index in range.clone() {
-            let [a, b] = self.parents[index].map(|v| self.colour(base_colours, v));
+            let parents = self.parents[index];
             scratch.push(
                 self.positions.get(index),
                 self.normals.get(index),
                 self.material[index],
-                std::array::from_fn(|k| (a[k] + b[k]) * 0.5),
+                self.half_way(world, base_colours, shown, parents),
             );
         }
         scratch.illuminate(exec, world, eye);
-        for (sample, index) in range.enumerate() {
+        for (sample, index) in range.clone().enumerate() {
             self.colours.set(index, scratch.colour(sample));
             self.surplus.set(index, scratch.deviation(sample));
         }
+        if shown.is_some_and(Shown::is_encoded) {
+            encode_all(exec.level, &self.colours, range.start, &mut self.codes);
+        }
         self.scratch = scratch;
     }
+
+    /// What interpolation shows half way between two vertices.
+    fn half_way(
+        &self,
+        world: &World,
+        base_colours: &Vec3s,
+        shown: Option<&Shown>,
+        [a, b]: [u32; 2],
+    ) -> Colour {
+        let [p, q] = [a, b].map(|v| self.shown_colour(shown, base_colours, v));
+        match shown {
+            Some(shown) if shown.is_encoded() => {
+                let [at, bt] = [a, b].map(|v| self.position(world, v));
+                shown.blend([0.5, 0.5, 0.0], [at, bt, bt], [p, q, q])
+            }
+            _ => std::array::from_fn(|k| (p[k] + q[k]) * 0.5),
+        }
+    }
+}
+
+/// Encodes colours from the one at `first` on.
+fn encode_all(level: Level, colours: &Vec3s, first: usize, codes: &mut Vec3s) {
+    codes.resize(colours.len());
+    encode_codes(level, &colours.x[first..], &mut codes.x[first..]);
+    encode_codes(level, &colours.y[first..], &mut codes.y[first..]);
+    encode_codes(level, &colours.z[first..], &mut codes.z[first..]);
 }

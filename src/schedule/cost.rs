@@ -38,6 +38,11 @@ pub const BOUNDS_LIGHT_NS: f32 = 153.0;
 /// Copying a pixel into the caller's frame, until the engine has measured it: see [`LearnedRate`](super::LearnedRate).
 pub const PRESENT_PIXEL_NS: f32 = 0.4;
 
+/// Drawing everything once, on a backend that cannot repaint: a part for each triangle, until the engine has measured it.
+pub const DRAW_TRIANGLE_NS: f32 = 2700.0;
+/// See [`DRAW_TRIANGLE_NS`]: a part for each pixel that triangles cover, hidden ones included.
+pub const DRAW_PIXEL_NS: f32 = 20.0;
+
 /// Illuminating `vertices` points under `lights` lights.
 #[must_use]
 pub fn vertices(vertices: f32, lights: usize) -> f32 {
@@ -66,6 +71,12 @@ pub fn repaint(patches: f32, pixels: f32) -> f32 {
 #[must_use]
 pub fn phong(pixels: f32, lights: usize) -> f32 {
     PHONG_NS + pixels * (PHONG_PIXEL_NS + PHONG_PIXEL_LIGHT_NS * lights as f32)
+}
+
+/// Drawing `triangles` triangles of `pixels` pixels altogether on a backend that cannot repaint.
+#[must_use]
+pub fn drawing(triangles: f32, pixels: f32) -> f32 {
+    triangles * DRAW_TRIANGLE_NS + pixels * DRAW_PIXEL_NS
 }
 
 /// Bounding `lights` lights on a triangle.

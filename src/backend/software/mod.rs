@@ -30,7 +30,9 @@ mod visible;
 
 pub use tile::NO_TRIANGLE;
 
-use super::{Backend, BasePaint, Capabilities, Geometry, Patch, RasterCounts};
+use super::{
+    Backend, BasePaint, Capabilities, Geometry, Interpolation, Patch, RasterCounts, new_writer,
+};
 use crate::output::{Stamp, Target};
 use crate::parallel::Exec;
 use crate::simd::dispatch;
@@ -38,13 +40,9 @@ use repaint::Job;
 use resolve::Painter;
 use shares::Shares;
 use std::fmt;
-use std::sync::atomic::{AtomicU64, Ordering};
 use tile::{Grid, TILE_SIDE, Tile};
 use transform::Vertices;
 use visible::Visible;
-
-/// Tells backends apart in the stamps of frames.
-static WRITERS: AtomicU64 = AtomicU64::new(0);
 
 /// The tiled software rasterizer: knows the owner of every pixel, and can illuminate every pixel.
 ///
@@ -93,7 +91,7 @@ impl SoftwareBackend {
     #[must_use]
     pub fn new() -> Self {
         Self {
-            writer: WRITERS.fetch_add(1, Ordering::Relaxed),
+            writer: new_writer(),
             serial: 0,
             grid: Grid::default(),
             tiles: Vec::new(),
@@ -160,6 +158,7 @@ impl Backend for SoftwareBackend {
         Capabilities {
             ids: true,
             per_pixel: true,
+            interpolation: Interpolation::LinearPerspective,
         }
     }
 
@@ -228,6 +227,9 @@ impl Backend for SoftwareBackend {
     }
 
     fn pending_pixels(&self, target: &Target<'_>) -> u64 {
+        if (target.width(), target.height()) != (self.grid.width, self.grid.height) {
+            return 0;
+        }
         let known = present::known_serial(self.writer, target);
         present::stale_tiles(&self.tiles, known)
             .map(Tile::pixels)

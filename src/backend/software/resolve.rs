@@ -63,7 +63,8 @@ pub(super) fn resolve_tile<S: Simd>(
         return;
     }
     match paint {
-        BasePaint::Gouraud(colours) => {
+        // Parts are for backends that cannot repaint.
+        BasePaint::Gouraud(colours) | BasePaint::Refined { colours, .. } => {
             let mut gouraud = Gouraud {
                 painter,
                 colours,

@@ -143,6 +143,7 @@ impl Job<'_> {
             &self.scene,
             EngineOptions {
                 method: args.method,
+                backend: args.machine.backend,
                 threads: args.machine.threads,
                 simd: args.machine.simd,
                 ..EngineOptions::default()

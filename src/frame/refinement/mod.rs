@@ -10,9 +10,12 @@
 //! * A **painting** piece paints patches off that list, in order. Large areas have been cut into patches that each take
 //!   a fraction of a piece. The list survives the end of a frame; planning goes on when it is empty.
 //!
+//! A backend that cannot repaint has no painting pieces: see [`drawn_once`].
+//!
 //! Plans depend on nominal costs and estimates only, and patches are painted in list order until the budget ends, so
 //! that a budget in work units gives the same image for any number of threads.
 
+mod drawn_once;
 mod leaves;
 mod painting;
 mod parts;
@@ -29,6 +32,7 @@ use crate::refine::estimate::{SAMPLES_AT_ONCE, Samples};
 use crate::refine::{FIRST_LEAVES, Forest, LeafId, SplitOutcome};
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, RankedQueue};
+pub(super) use drawn_once::DrawnLeaves;
 pub(super) use leaves::for_each_leaf;
 pub use leaves::{Leaf, LeafKind};
 use parts::Part;
@@ -146,9 +150,15 @@ pub(super) struct Refinement {
     ranked_parts: usize,
     /// Triangles are shaded per pixel in the order of their area ([`Method::PhongArea`]).
     by_area: bool,
+    /// There is no painting: everything is drawn after it has been refined. See [`drawn_once`].
+    is_drawn_once: bool,
+    /// Splits committed for the current image.
+    commits: u64,
+    /// Visible pixels of all roots.
+    pixels: u64,
     /// By leaf.
     progressing: Vec<Progressing>,
-    /// Expected sum of squared errors over all covered pixels, per channel, in squared codes.
+    /// Expected sum of squared errors over the pixels of all roots, per channel, in squared codes.
     error_mass: f64,
     counters: Counters,
     /// Nominal cost of the bounds found by the candidate being planned.
@@ -183,6 +193,8 @@ impl Refinement {
         self.parts.clear();
         self.samples.clear();
         self.ranked_parts = 0;
+        self.commits = 0;
+        self.pixels = 0;
         self.error_mass = 0.0;
         self.counters = Counters::default();
     }
@@ -226,6 +238,12 @@ impl Refinement {
         self.forest.reset(world);
         self.root_of_triangle
             .resize(world.triangles.len(), u32::MAX);
+        let capabilities = backend.capabilities();
+        self.is_drawn_once = !capabilities.refines_in_place();
+        if self.is_drawn_once {
+            self.forest
+                .draw_once(exec.level, view, capabilities.interpolation, base.colours());
+        }
         // The rival knows areas only: no estimates, no bounds, no subdivision.
         self.by_area = method == Method::PhongArea;
         let shading = self.by_area.then(|| {
@@ -253,7 +271,11 @@ impl Refinement {
         }
         for index in 0..self.roots.len() {
             let root = self.roots[index];
+            self.pixels += u64::from(root.pixels);
             self.error_mass += f64::from(root.pixels) * f64::from(root.prior);
+            if self.is_drawn_once && root.pixels < drawn_once::LEAST_PIXELS {
+                continue;
+            }
             let (rank, _) = self.choose_for_root(&root, world.lights.len());
             self.queue.push(rank, Candidate::Root(index as u32));
         }
@@ -290,7 +312,7 @@ impl Refinement {
 
     /// Fills in how far the image has come.
     pub(super) fn report(&self, method: Method, stats: &mut FrameStats) {
-        let covered = stats.covered_pixels.max(1) as f64;
+        let covered = self.pixels.max(1) as f64;
         stats.estimated_error = match method {
             Method::Flat | Method::Gouraud => f64::NAN,
             _ => (self.error_mass.max(0.0) / covered).sqrt(),

@@ -74,7 +74,7 @@ impl Refinement {
         let units = match (candidate, action) {
             (Candidate::Root(_), Action::Shade) => cost::LIST_NS,
             (Candidate::Root(index), Action::Split(_)) => {
-                ranking::planting_cost(self.roots[index as usize].pixels, lights)
+                self.planting_cost(self.roots[index as usize].pixels, lights)
             }
             (Candidate::Leaf(leaf), Action::Shade) => {
                 ranking::cutting_cost(self.forest.leaf(leaf).pixels as f32, lights)
@@ -91,6 +91,9 @@ impl Refinement {
 
     /// What bounding the lights on the candidate's root will cost, should it come to that.
     fn bounds_cost(&self, stage: &Stage<'_>, candidate: Candidate) -> u64 {
+        if self.is_drawn_once {
+            return 0;
+        }
         let root = match candidate {
             Candidate::Root(index) => Some(index),
             Candidate::Leaf(leaf) => self.root_of(self.forest.leaf(leaf).triangle),
@@ -123,13 +126,15 @@ impl Refinement {
                 .forest
                 .plant(stage.world, colours, root.triangle, root.pixels)
                 .is_some();
-        if !is_planted {
+        if !is_planted && !self.is_drawn_once {
             self.shade_root(stage, index);
         }
     }
 
     fn plan_leaf(&mut self, stage: &Stage<'_>, leaf: LeafId, action: Action) {
         let marks = match action {
+            // It stays as it is, and follows its neighbours.
+            Action::Shade if self.is_drawn_once => return,
             Action::Shade if parts::is_large(self.forest.leaf(leaf).pixels as f32) => {
                 return self.cut_into_parts(stage, leaf);
             }
@@ -200,6 +205,7 @@ impl Refinement {
                 return self.offer_leaf(stage, *leaf);
             }
             SplitOutcome::Committed { parents, children } => {
+                self.commits += 1;
                 for parent in parents.clone() {
                     let parent = self.forest.split_parent(parent);
                     self.error_mass -= self.leaf_mass(parent);
@@ -212,6 +218,10 @@ impl Refinement {
         };
         for child in children {
             self.error_mass += self.leaf_mass(child);
+            if self.is_drawn_once {
+                self.offer_leaf(stage, child);
+                continue;
+            }
             let leaf = self.forest.leaf(child);
             let patch = Patch {
                 triangle: leaf.triangle,
@@ -298,9 +308,16 @@ impl Refinement {
         }
     }
 
-    /// Ranks an open leaf and puts it on the queue; one without pixels is done.
+    /// Ranks an open leaf and puts it on the queue; one without pixels is done, and so is one that is good enough to be drawn.
     pub(super) fn offer_leaf(&mut self, stage: &Stage<'_>, leaf: LeafId) {
         if self.forest.leaf(leaf).state != LeafState::Open {
+            return;
+        }
+        if self.is_drawn_once {
+            if self.is_worth_splitting(stage, leaf) {
+                let rank = self.choose(stage, leaf).0;
+                self.queue.push(rank, Candidate::Leaf(leaf));
+            }
             return;
         }
         if self.forest.leaf(leaf).pixels == 0 {

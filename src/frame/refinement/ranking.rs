@@ -8,11 +8,11 @@
 //!   that share a marked edge are repainted: they share benefit and cost.
 //! * *Shading per pixel*, after which no error is left.
 
+use super::drawn_once;
 use super::parts::{self, CUT, SAMPLES_PER_PART};
 use super::{Refinement, Root, Shading, Stage};
 use crate::geometry::Vec3s;
 use crate::refine::LeafId;
-use crate::refine::estimate::sample_count;
 use crate::scene::World;
 use crate::schedule::cost;
 
@@ -52,11 +52,6 @@ pub(super) fn prior_error(world: &World, colours: &Vec3s, triangle: u32, is_pht:
     contrast * contrast / 1024.0 + highlight + ERROR_FLOOR
 }
 
-/// Nominal cost of making a triangle or leaf of `pixels` pixels a leaf that can be split.
-pub(super) fn planting_cost(pixels: u32, lights: usize) -> f32 {
-    cost::leaves(1.0, POINTS_PER_LEAF, lights) + cost::samples(sample_count(pixels), lights)
-}
-
 /// Nominal cost of cutting a leaf or part of `pixels` pixels into parts, or of putting it on the list if it is small.
 pub(super) fn cutting_cost(pixels: f32, lights: usize) -> f32 {
     if parts::is_large(pixels) {
@@ -67,6 +62,12 @@ pub(super) fn cutting_cost(pixels: f32, lights: usize) -> f32 {
 }
 
 impl Refinement {
+    /// Nominal cost of making a triangle or leaf of `pixels` pixels a leaf that can be split.
+    pub(super) fn planting_cost(&self, pixels: u32, lights: usize) -> f32 {
+        let samples = self.forest.sample_count(pixels);
+        cost::leaves(1.0, POINTS_PER_LEAF, lights) + cost::samples(samples, lights)
+    }
+
     /// What to do with a triangle that has not been looked at, and its rank: shade it, or make it the root of a
     /// subdivision, whose first split is assumed to be into four.
     pub(super) fn choose_for_root(&self, root: &Root, lights: usize) -> (f32, Action) {
@@ -75,8 +76,12 @@ impl Refinement {
             return (pixels, Action::Shade);
         }
         let benefit = pixels * root.prior;
-        let shade = benefit / cost::phong(pixels, lights);
-        let planting = planting_cost(root.pixels, lights);
+        let shade = if self.is_drawn_once {
+            0.0
+        } else {
+            benefit / cost::phong(pixels, lights)
+        };
+        let planting = self.planting_cost(root.pixels, lights);
         let split = benefit * (15.0 / 16.0) / (planting + split_cost(pixels, 3, lights));
         if split > shade {
             (split, Action::Split(7))
@@ -90,7 +95,13 @@ impl Refinement {
         let leaf = self.forest.leaf(id);
         let lights = stage.world.lights.len();
         let error = leaf.error.max(ERROR_FLOOR);
-        let pixels = leaf.pixels as f32;
+        let mut pixels = leaf.pixels as f32;
+        if self.is_drawn_once {
+            if !leaf.splittable {
+                return self.choose_insisting(stage, id);
+            }
+            pixels = pixels.max(drawn_once::SLIVER_PIXELS);
+        }
 
         // A large leaf is shaded part by part, those first that hold the error.
         let active = self.active_lights(stage, leaf.triangle);
@@ -100,7 +111,11 @@ impl Refinement {
             1.0
         };
         let shade_cost = cutting_cost(pixels, lights) + cost::phong(pixels * share, active);
-        let shade = pixels * error / shade_cost;
+        let shade = if self.is_drawn_once {
+            0.0
+        } else {
+            pixels * error / shade_cost
+        };
         if !leaf.splittable {
             return (shade, Action::Shade);
         }
@@ -136,11 +151,11 @@ impl Refinement {
     pub(super) fn splitting_cost(&self, stage: &Stage<'_>, id: LeafId, marks: u8) -> f32 {
         let lights = stage.world.lights.len();
         let mut children = marks.count_ones() + 1;
-        let mut samples = sample_count(self.forest.leaf(id).pixels);
+        let mut samples = self.forest.sample_count(self.forest.leaf(id).pixels);
         for k in (0..3).filter(|k| marks >> k & 1 == 1) {
             for (neighbour, _) in self.forest.neighbours(stage.world, id, k) {
                 children += 2;
-                samples += sample_count(self.forest.leaf(neighbour).pixels);
+                samples += self.forest.sample_count(self.forest.leaf(neighbour).pixels);
             }
         }
         cost::leaves(children as f32, POINTS_PER_LEAF, lights) + cost::samples(samples, lights)
@@ -186,7 +201,7 @@ impl Refinement {
 }
 
 /// Nominal cost of splitting `edges` edges of a leaf of `pixels` pixels, and painting its children.
-fn split_cost(pixels: f32, edges: u32, lights: usize) -> f32 {
+pub(super) fn split_cost(pixels: f32, edges: u32, lights: usize) -> f32 {
     let children = (edges + 1) as f32;
     cost::leaves(children, POINTS_PER_LEAF, lights) + cost::repaint(children, pixels)
 }

@@ -1,0 +1,160 @@
+//! A backend that writes down what it is told, for tests of an engine.
+//!
+//! It passes everything on to another backend, so that the engine sees real images and counts, and keeps a [`Log`] that
+//! a test reads through a handle of its own, while the engine owns the backend:
+//!
+//! ```
+//! use specula::backend::recording::{Call, RecordingBackend};
+//! use specula::{BackendKind, Budget, Engine, EngineOptions, Frame, Scene};
+//!
+//! let scene = Scene::parse("(objects: [(shape: Teapot())])", "teapot.ron")?;
+//! let (backend, log) = RecordingBackend::new(BackendKind::Software.create());
+//! let mut engine = Engine::with_backend(&scene, EngineOptions::default(), Box::new(backend))?;
+//! let mut frame = Frame::new(64, 36);
+//! engine.render(&scene, Budget::Unlimited, &mut frame);
+//! log.take();
+//! // The image is final: there is nothing to draw, and nothing to hand over.
+//! engine.render(&scene, Budget::Unlimited, &mut frame);
+//! assert_eq!(log.take(), [Call::Present { pixels: 0 }]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use super::{Backend, BasePaint, Capabilities, Geometry, Patch, RasterCounts, RefinedPart};
+use crate::output::Target;
+use crate::parallel::Exec;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// One call of a method that changes something.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Call {
+    /// [`Backend::rasterize`].
+    Rasterize {
+        /// Image width and height in pixels.
+        size: [u32; 2],
+        /// What it counted.
+        counts: RasterCounts,
+        /// Triangles that were found to be visible.
+        visible: Vec<u32>,
+    },
+    /// [`Backend::resolve`].
+    Resolve(Paint),
+    /// [`Backend::repaint`].
+    Repaint {
+        /// How many patches.
+        patches: usize,
+        /// Pixels painted, as counted.
+        pixels: u64,
+    },
+    /// [`Backend::present`].
+    Present {
+        /// Pixels written.
+        pixels: u64,
+    },
+}
+
+/// A [`BasePaint`] without its colours.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Paint {
+    /// [`BasePaint::Gouraud`].
+    Gouraud,
+    /// [`BasePaint::Flat`].
+    Flat,
+    /// [`BasePaint::Phong`].
+    Phong,
+    /// [`BasePaint::Refined`], with its parts.
+    Refined(Vec<RefinedPart>),
+}
+
+/// The calls so far. Clones read the same log.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    calls: Arc<Mutex<Vec<Call>>>,
+}
+
+impl Log {
+    /// All calls since the last time, in order; they are removed.
+    pub fn take(&self) -> Vec<Call> {
+        std::mem::take(&mut *self.lock())
+    }
+
+    fn push(&self, call: Call) {
+        self.lock().push(call);
+    }
+
+    /// A thread that panicked while it held the log left it whole.
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Call>> {
+        self.calls.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Passes all calls on and writes them down.
+#[derive(Debug)]
+pub struct RecordingBackend {
+    inner: Box<dyn Backend>,
+    log: Log,
+}
+
+impl RecordingBackend {
+    /// A backend that does what `inner` does, and the log of its calls.
+    #[must_use]
+    pub fn new(inner: Box<dyn Backend>) -> (Self, Log) {
+        let log = Log::default();
+        let backend = Self {
+            inner,
+            log: log.clone(),
+        };
+        (backend, log)
+    }
+}
+
+impl Backend for RecordingBackend {
+    fn capabilities(&self) -> Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts {
+        let counts = self.inner.rasterize(exec, geometry);
+        self.log.push(Call::Rasterize {
+            size: [geometry.view.width, geometry.view.height],
+            counts,
+            visible: self.inner.visible_triangles().to_vec(),
+        });
+        counts
+    }
+
+    fn visible_triangles(&self) -> &[u32] {
+        self.inner.visible_triangles()
+    }
+
+    fn visible_pixels(&self, triangle: u32) -> u32 {
+        self.inner.visible_pixels(triangle)
+    }
+
+    fn resolve(&mut self, exec: Exec, geometry: Geometry<'_>, paint: BasePaint<'_>) {
+        self.log.push(Call::Resolve(match paint {
+            BasePaint::Gouraud(_) => Paint::Gouraud,
+            BasePaint::Flat(_) => Paint::Flat,
+            BasePaint::Phong => Paint::Phong,
+            BasePaint::Refined { parts, .. } => Paint::Refined(parts.to_vec()),
+        }));
+        self.inner.resolve(exec, geometry, paint);
+    }
+
+    fn repaint(&mut self, exec: Exec, geometry: Geometry<'_>, patches: &mut [Patch]) {
+        self.inner.repaint(exec, geometry, patches);
+        self.log.push(Call::Repaint {
+            patches: patches.len(),
+            pixels: patches.iter().map(|patch| u64::from(patch.pixels)).sum(),
+        });
+    }
+
+    fn pending_pixels(&self, target: &Target<'_>) -> u64 {
+        self.inner.pending_pixels(target)
+    }
+
+    fn present(&mut self, exec: Exec, target: &mut Target<'_>) -> u64 {
+        let pixels = self.inner.present(exec, target);
+        self.log.push(Call::Present { pixels });
+        pixels
+    }
+}
