@@ -1,8 +1,9 @@
 //! A device that can draw Gouraud-shaded triangles.
 //!
 //! The engine asks a [`Backend`] for an image in two steps, [`rasterize`](Backend::rasterize) (which triangles can be
-//! seen, and where?) and [`resolve`](Backend::resolve) (what colour are they?), so that vertices of triangles that cannot
-//! be seen are never illuminated. What follows depends on what the backend declares to be [capable of](Capabilities):
+//! seen, and where?) and [`resolve`](Backend::resolve) (what colour are they?), so that vertices of triangles that
+//! cannot be seen are never illuminated. What follows depends on what the backend declares to be [capable
+//! of](Capabilities):
 //!
 //! * With ids and per-pixel shading the first image is drawn at once, and [`repaint`](Backend::repaint) replaces parts
 //!   of single triangles as they are refined.
@@ -49,8 +50,8 @@ pub struct Capabilities {
     pub ids: bool,
     /// It can evaluate the illumination equation at every pixel.
     pub per_pixel: bool,
-    /// How it interpolates between the corners of a triangle. Refinement estimates errors against what will be shown, so a
-    /// backend that declares the wrong one is refined in the wrong places, or too little.
+    /// How it interpolates between the corners of a triangle. Refinement estimates errors against what will be shown,
+    /// so a backend that declares the wrong one is refined in the wrong places, or too little.
     pub interpolation: Interpolation,
 }
 
@@ -165,9 +166,9 @@ pub enum Fill {
 ///
 /// **What may be assumed.** Indices are in range, `visible` is ascending and disjoint, and the view's sides are at most
 /// [`MAX_IMAGE_SIDE`](crate::geometry::screen::MAX_IMAGE_SIDE). The world's triangles, positions and sidedness do not
-/// change during an image; lights, materials, normals and background may, from one `resolve` to the next. Nothing else is
-/// promised: coordinates may be anywhere, behind the eye, huge, or no numbers at all; colours may be negative, above 1 or
-/// NaN (which counts as black); triangles may have no area; an image may have no pixels.
+/// change during an image; lights, materials, normals and background may, from one `resolve` to the next. Nothing
+/// else is promised: coordinates may be anywhere, behind the eye, huge, or no numbers at all; colours may be
+/// negative, above 1 or NaN (which counts as black); triangles may have no area; an image may have no pixels.
 ///
 /// **Which triangles, which pixels.** A triangle that turns its back to the viewer is not drawn unless its material is
 /// two-sided. What lies outside of the near and far planes is not drawn. A pixel is covered when its centre lies inside
@@ -178,13 +179,14 @@ pub enum Fill {
 /// world's background, encoded.
 ///
 /// **Colours.** Pixels are 8-bit sRGB and opaque. Between the corners of a triangle colours are interpolated as declared
-/// by [`Interpolation`], within two codes, rounding included. With ids a patch's colours are interpolated over the patch.
+/// by [`Interpolation`], within two codes, rounding included. With ids a patch's colours are interpolated over the
+/// patch.
 ///
 /// **Presenting.** `present` leaves the target equal to the current image, in its order of bytes, and marks it with a
-/// stamp of its own ([`new_writer`] gives the number to sign with). It writes all pixels that may differ, and no others
-/// as far as it can tell: what a target holds is known by the [stamp](Target::stamp) that it comes with, and one without,
-/// or with that of another writer, is written in full. Bytes between rows and behind the last are not touched. A target
-/// that does not have the view's size is left alone, and nothing is pending for it.
+/// stamp of its own ([`new_writer`] gives the number to sign with). It writes all pixels that may differ, and no
+/// others as far as it can tell: what a target holds is known by the [stamp](Target::stamp) that it comes with, and
+/// one without, or with that of another writer, is written in full. Bytes between rows and behind the last are not
+/// touched. A target that does not have the view's size is left alone, and nothing is pending for it.
 ///
 /// **Determinism.** Results do not depend on `exec.threads`, nor on what was drawn before; for the same input they are
 /// the same bits. With `exec.threads > 1` calls are made inside a rayon pool, and a backend spawns its work there only.
@@ -195,27 +197,28 @@ pub trait Backend: Debug + Send {
     /// What it can do; always the same.
     fn capabilities(&self) -> Capabilities;
 
-    /// Starts a new image of the view's size and finds out which triangles can be seen. The image's colours are undefined
-    /// until [`resolve`](Self::resolve).
+    /// Starts a new image of the view's size and finds out which triangles can be seen. The image's colours are
+    /// undefined until [`resolve`](Self::resolve).
     fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts;
 
-    /// The triangles whose vertices have to be illuminated, ascending. With ids: those that own a pixel. Without: those
-    /// that face the viewer (or are two-sided) and may touch the centre of a pixel, whether something hides them or not.
+    /// The triangles whose vertices have to be illuminated, ascending. With ids: those that own a pixel. Without:
+    /// those that face the viewer (or are two-sided) and may touch the centre of a pixel, whether something hides
+    /// them or not.
     fn visible_triangles(&self) -> &[u32];
 
-    /// How many pixels a triangle takes up. With ids: owns, zero for those that are not visible. Without:
-    /// an estimate of its projected area inside the image in pixels, at least 1, for a visible one, and zero for others.
+    /// How many pixels a triangle takes up. With ids: owns, zero for those that are not visible. Without: an estimate
+    /// of its projected area inside the image in pixels, at least 1, for a visible one, and zero for others.
     fn visible_pixels(&self, triangle: u32) -> u32;
 
     /// Gives every pixel of the image its colour.
     fn resolve(&mut self, exec: Exec, geometry: Geometry<'_>, paint: BasePaint<'_>);
 
     /// With ids: paints exactly the pixels that each patch's triangle owns inside the patch, and counts them in
-    /// [`Patch::pixels`]. Patches of one call must not overlap. A pixel on the border of two adjacent patches belongs to
-    /// exactly one. Patches that partition a triangle together count
-    /// [`visible_pixels`](Self::visible_pixels).
+    /// [`Patch::pixels`]. Patches of one call must not overlap. A pixel on the border of two adjacent patches belongs
+    /// to exactly one. Patches that partition a triangle together count [`visible_pixels`](Self::visible_pixels).
     ///
-    /// Never called on a backend that does not [refine in place](Capabilities::refines_in_place), which need not implement it.
+    /// Never called on a backend that does not [refine in place](Capabilities::refines_in_place), which need not
+    /// implement it.
     fn repaint(&mut self, exec: Exec, geometry: Geometry<'_>, patches: &mut [Patch]) {
         let _ = (exec, geometry, patches);
     }

@@ -8,8 +8,7 @@ use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
 use crate::output::Interpolation;
 use crate::parallel::Exec;
-use crate::scene::{Eye, View, World};
-use crate::simd::Level;
+use crate::scene::{Eye, World};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -26,9 +25,6 @@ pub(super) const MAX_LEAVES: usize = 1 << 18;
 /// Leaves that there is room for from the start, lest moving views make every list grow again and again. To make so many takes
 /// longer than a frame of an animation lasts; only a view that stays refines further.
 pub const FIRST_LEAVES: usize = 1 << 13;
-
-/// How many times more densely leaves are sampled that are drawn once.
-const DENSER: u32 = 4;
 
 /// What has become of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,28 +116,6 @@ impl Forest {
         self.samples.set_interpolation(Interpolation::default());
     }
 
-    /// Says, after [`reset`](Self::reset), that the image will be drawn once, by a device that interpolates so and neither
-    /// counts pixels nor shades them: errors are measured against what it will show, pixels are estimated by area
-    /// inside the image, large leaves are sampled more densely because nothing else will look into them, and a split that did not
-    /// help is carried out when it is asked for again.
-    pub fn draw_once(
-        &mut self,
-        level: Level,
-        view: &View,
-        interpolation: Interpolation,
-        base_colours: &Vec3s,
-    ) {
-        let shown = Shown {
-            view: *view,
-            interpolation,
-        };
-        if shown.is_encoded() {
-            self.vertices.encode_base(level, base_colours);
-        }
-        self.samples.set_interpolation(interpolation);
-        self.shown = Some(shown);
-    }
-
     /// How many triangles were ever made leaves.
     #[must_use]
     pub fn planted_roots(&self) -> usize {
@@ -154,23 +128,6 @@ impl Forest {
         self.leaves[id as usize]
             .vertices
             .map(|v| self.vertices.position(world, v))
-    }
-
-    /// The longest edge of a leaf on the screen, in pixels, for an image that is [drawn once](Self::draw_once); zero when
-    /// nothing of it is inside the image.
-    #[must_use]
-    pub fn longest_edge_px(&self, world: &World, id: LeafId) -> f32 {
-        let shown = self.shown.as_ref();
-        shown.map_or(0.0, |shown| shown.longest_edge(self.positions(world, id)))
-    }
-
-    /// How many points inside a leaf of `pixels` pixels are sampled.
-    #[must_use]
-    pub fn sample_count(&self, pixels: u32) -> usize {
-        estimate::sample_count(match self.shown {
-            Some(_) => pixels.saturating_mul(DENSER),
-            None => pixels,
-        })
     }
 
     /// A leaf.
@@ -357,27 +314,6 @@ impl Forest {
             );
         }
         leaf.samples = first..self.samples.len();
-    }
-
-    /// Colours of vertices as they are interpolated.
-    pub(super) fn shown_colours(&self, base_colours: &Vec3s, vertices: [u32; 3]) -> [[f32; 3]; 3] {
-        vertices.map(|v| {
-            self.vertices
-                .shown_colour(self.shown.as_ref(), base_colours, v)
-        })
-    }
-
-    /// What is shown at a point inside a triangle, by its barycentric coordinates and the colours that are interpolated.
-    pub(super) fn shown_blend(
-        &self,
-        weights: [f32; 3],
-        corners: [[f32; 3]; 3],
-        colours: [[f32; 3]; 3],
-    ) -> [f32; 3] {
-        match &self.shown {
-            Some(shown) => shown.blend(weights, corners, colours),
-            None => blend(weights, colours),
-        }
     }
 
     /// Error of a leaf by the surplus at its edges and the deviations at its samples.

@@ -17,15 +17,16 @@
 //!   when the leaf is made; they are the vertices of its children. Large leaves are sampled inside too, because a small
 //!   highlight in a large triangle may touch none of its edges. See [`estimate`].
 //! * **Not every split helps** (paper, 3.1.2): a new vertex on a highlight may spread it over the whole leaf. A split
-//!   is [planned](Forest::plan_split), its vertices are [illuminated](Forest::illuminate), and only if the estimated error
-//!   of the children is below that of the parents *at the same points* is it [committed](Forest::conclude_splits).
+//!   is [planned](Forest::plan_split), its vertices are [illuminated](Forest::illuminate), and only if the estimated
+//!   error of the children is below that of the parents *at the same points* is it
+//!   [committed](Forest::conclude_splits).
 //!
 //! Leaves that have been shaded per pixel are [closed](Forest::close): they are right already, so their edges no longer
 //! count, nor do those of triangles without a visible pixel.
 //!
 //! **Drawn once.** On a backend without ids there is no repainting: everything is drawn after it has been refined
-//! ([`Forest::draw_once`]). Nothing is closed there, and every triangle that is drawn follows its neighbours' splits, so that
-//! no T-junction can become a crack.
+//! ([`Forest::draw_once`]). Nothing is closed there, and every triangle that is drawn follows its neighbours' splits,
+//! so that no T-junction can become a crack.
 
 pub mod estimate;
 mod forest;

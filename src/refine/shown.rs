@@ -2,17 +2,25 @@
 //!
 //! **Colour.** Between corners `i` with barycentric coordinates `b_i` a device that interpolates in perspective shows
 //! `sum b_i c_i`, in linear light. One that interpolates [codes affinely on the
-//! screen](Interpolation::EncodedAffine) shows codes weighted by the place on the screen: a point projects to the weighted mean
-//! of the projected corners with weights `b_i w_i / sum b_j w_j`, `w` being the homogeneous coordinate. So half way
-//! along an edge in space is not half way on the screen, and an edge has a surplus even where light is linear.
+//! screen](Interpolation::EncodedAffine) shows codes weighted by the place on the screen: a point projects to the
+//! weighted mean of the projected corners with weights `b_i w_i / sum b_j w_j`, `w` being the homogeneous coordinate.
+//! So half way along an edge in space is not half way on the screen, and an edge has a surplus even where light is
+//! linear.
 //!
 //! **Pixels.** Nobody counts them, so a triangle's are estimated by its area inside the image.
 
+use super::estimate;
+use super::{Forest, LeafId};
+use crate::geometry::Vec3s;
 use crate::geometry::bary::blend;
 use crate::geometry::screen::{clip, outcode};
 use crate::geometry::viewport::{ScreenPolygon, ScreenRect};
 use crate::output::Interpolation;
-use crate::scene::View;
+use crate::scene::{View, World};
+use crate::simd::Level;
+
+/// How many times more densely leaves are sampled that are drawn once.
+const DENSER: u32 = 4;
 
 /// The view and the device of an image that is drawn once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +35,8 @@ impl Shown {
         self.interpolation == Interpolation::EncodedAffine
     }
 
-    /// What is shown at a point inside a triangle: `weights` are its barycentric coordinates, `colours` those of the corners as
-    /// they are interpolated (linear, or codes).
+    /// What is shown at a point inside a triangle: `weights` are its barycentric coordinates, `colours` those of the
+    /// corners as they are interpolated (linear, or codes).
     pub(super) fn blend(
         &self,
         weights: [f32; 3],
@@ -89,6 +97,69 @@ impl Shown {
         };
         let image = ScreenRect::image(self.view.width, self.view.height);
         polygon.cut_to(&image).area() as f32
+    }
+}
+
+impl Forest {
+    /// Says, after [`reset`](Self::reset), that the image will be drawn once, by a device that interpolates so and
+    /// neither counts pixels nor shades them: errors are measured against what it will show, pixels are estimated by
+    /// area inside the image, large leaves are sampled more densely because nothing else will look into them, and a
+    /// split that did not help is carried out when it is asked for again.
+    pub fn draw_once(
+        &mut self,
+        level: Level,
+        view: &View,
+        interpolation: Interpolation,
+        base_colours: &Vec3s,
+    ) {
+        let shown = Shown {
+            view: *view,
+            interpolation,
+        };
+        if shown.is_encoded() {
+            self.vertices.encode_base(level, base_colours);
+        }
+        self.samples.set_interpolation(interpolation);
+        self.shown = Some(shown);
+    }
+
+    /// The longest edge of a leaf on the screen, in pixels, for an image that is [drawn once](Self::draw_once); zero
+    /// when nothing of it is inside the image.
+    #[must_use]
+    pub fn longest_edge_px(&self, world: &World, id: LeafId) -> f32 {
+        let shown = self.shown.as_ref();
+        shown.map_or(0.0, |shown| shown.longest_edge(self.positions(world, id)))
+    }
+
+    /// How many points inside a leaf of `pixels` pixels are sampled.
+    #[must_use]
+    pub fn sample_count(&self, pixels: u32) -> usize {
+        estimate::sample_count(match self.shown {
+            Some(_) => pixels.saturating_mul(DENSER),
+            None => pixels,
+        })
+    }
+
+    /// Colours of vertices as they are interpolated.
+    pub(super) fn shown_colours(&self, base_colours: &Vec3s, vertices: [u32; 3]) -> [[f32; 3]; 3] {
+        vertices.map(|v| {
+            self.vertices
+                .shown_colour(self.shown.as_ref(), base_colours, v)
+        })
+    }
+
+    /// What is shown at a point inside a triangle, by its barycentric coordinates and the colours that are
+    /// interpolated.
+    pub(super) fn shown_blend(
+        &self,
+        weights: [f32; 3],
+        corners: [[f32; 3]; 3],
+        colours: [[f32; 3]; 3],
+    ) -> [f32; 3] {
+        match &self.shown {
+            Some(shown) => shown.blend(weights, corners, colours),
+            None => blend(weights, colours),
+        }
     }
 }
 

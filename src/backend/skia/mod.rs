@@ -2,12 +2,12 @@
 //!
 //! It knows neither depth nor triangle ids nor vertex colours, so it shows how little a device must be able to do:
 //!
-//! * **A Gouraud triangle is up to three linear gradients**, one for each channel: the first replaces what was there, the
-//!   others, black in all channels but one, are added ([`BlendMode::Plus`](tiny_skia::BlendMode::Plus)). Colours are
-//!   clamped and encoded at the corners; between them the *codes* are affine on the screen
+//! * **A Gouraud triangle is up to three linear gradients**, one for each channel: the first replaces what was there,
+//!   the others, black in all channels but one, are added ([`BlendMode::Plus`](tiny_skia::BlendMode::Plus)). Colours
+//!   are clamped and encoded at the corners; between them the *codes* are affine on the screen
 //!   ([`Interpolation::EncodedAffine`]). Each channel is rounded once.
-//! * **No anti-aliasing**, so that a pixel belongs to exactly one of two triangles that share an edge. Corners are rounded
-//!   to 1/64 pixel.
+//! * **No anti-aliasing**, so that a pixel belongs to exactly one of two triangles that share an edge. Corners are
+//!   rounded to 1/64 pixel.
 //! * **Painter's algorithm**: triangles are painted from far to near by the mean of their corners' reversed depths, of
 //!   equally deep ones the larger id first.
 //! * Everything is **drawn once**, after refinement: see [`BasePaint::Refined`].
@@ -15,23 +15,23 @@
 //! # Where it differs from `software`
 //!
 //! * At silhouettes, borders and creases by up to a pixel, because corners are snapped to a coarser grid.
-//! * Where triangles intersect, overlap cyclically, or are close to each other while very different in size: one depth
-//!   for a whole triangle cannot tell which of two is nearer at every pixel. A teapot's spout meets its body in a jagged
-//!   line. Refinement makes triangles smaller, and the sorting better; a floor of few triangles with small things on it
-//!   is the worst case.
-//! * In colour, by what refinement leaves: it ends when the estimate says half a code, or at triangles of a pixel. A few
-//!   pixels along slivers, which following their neighbours has made of some leaves, are off by tens of codes.
+//! * Where triangles intersect, overlap cyclically, or are close to each other while very different in size: one
+//!   depth for a whole triangle cannot tell which of two is nearer at every pixel. A teapot's spout meets its body in
+//!   a jagged line. Refinement makes triangles smaller, and the sorting better; a floor of few triangles with small
+//!   things on it is the worst case.
+//! * In colour, by what refinement leaves: it ends when the estimate says half a code, or at triangles of a pixel. A
+//!   few pixels along slivers, which following their neighbours has made of some leaves, are off by tens of codes.
 //!
-//! At 1280 x 720, refined to the end, `closeup` and `walls` are off by more than one code from per-pixel Phong shading in
-//! 0.01 and 0.02 % of their pixels, `teapot`, `lights16`, `heavy` and `minimal`, in which objects intersect or hide each
-//! other, in 0.5 to 0.8 %, `lights100` in 1.4 %.
+//! At 1280 x 720, refined to the end, `closeup` and `walls` are off by more than one code from per-pixel Phong
+//! shading in 0.01 and 0.02 % of their pixels, `teapot`, `lights16`, `heavy` and `minimal`, in which objects
+//! intersect or hide each other, in 0.5 to 0.8 %, `lights100` in 1.4 %.
 //!
 //! # Cost
 //!
-//! For each filled path tiny-skia compiles three pipelines and allocates a list of edges, and each gradient allocates its
-//! stops. A small triangle costs about 2.7 microseconds on one thread (three gradients), or 0.9 if it has one colour; a
-//! pixel about twenty nanoseconds. Tiles of 256 x 256 pixels are painted in parallel. Except for what tiny-skia allocates inside, memory
-//! is kept from image to image.
+//! For each filled path tiny-skia compiles three pipelines and allocates a list of edges, and each gradient allocates
+//! its stops. A small triangle costs about 2.7 microseconds on one thread (three gradients), or 0.9 if it has one
+//! colour; a pixel about twenty nanoseconds. Tiles of 256 x 256 pixels are painted in parallel. Except for what
+//! tiny-skia allocates inside, memory is kept from image to image.
 
 mod gradient;
 mod outline;

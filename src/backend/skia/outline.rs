@@ -1,9 +1,9 @@
 //! Where a triangle is on the screen.
 //!
 //! Facing is decided by the sign of the exact corners' determinant, in `f64`, not by a snapped area: tiny-skia snaps
-//! to a grid of its own, and a sliver that one grid turns around and leaves out the other may have pixels for. All triangles
-//! that face the viewer are drawn, whichever way snapping turns them. Snapping moves shared corners together, so what faces
-//! the viewer keeps covering all of its region.
+//! to a grid of its own, and a sliver that one grid turns around and leaves out the other may have pixels for. All
+//! triangles that face the viewer are drawn, whichever way snapping turns them. Snapping moves shared corners
+//! together, so what faces the viewer keeps covering all of its region.
 
 use crate::backend::Geometry;
 use crate::geometry::screen::{TrianglePlanes, clip, outcode};
@@ -21,8 +21,8 @@ pub(super) fn corners(geometry: Geometry<'_>, triangle: u32) -> [PixelPoint; 3] 
         .map(|v| geometry.view.project(world.positions.get(v as usize)))
 }
 
-/// What is left of a triangle inside of the near and far planes and the guard band, in homogeneous pixel space and on the
-/// screen.
+/// What is left of a triangle inside of the near and far planes and the guard band, in homogeneous pixel space and on
+/// the screen.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Outline {
     /// Nothing.

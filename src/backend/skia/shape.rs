@@ -15,8 +15,8 @@ use std::cmp::Ordering;
 pub(super) struct Shape {
     /// Reversed depth by which it is sorted: what is smaller is painted first.
     pub(super) depth: f32,
-    /// Place in the order of submission; of equally deep shapes the later ones are painted first, so that the smaller id
-    /// is in front.
+    /// Place in the order of submission; of equally deep shapes the later ones are painted first, so that the smaller
+    /// id is in front.
     pub(super) order: u32,
     /// Corners in pixels, within the guard band, on tiny-skia's [grid](GRID).
     pub(super) points: [[f64; 2]; 3],
@@ -145,8 +145,9 @@ impl Collector<'_> {
 /// tiny-skia's sub-pixels.
 pub(super) const GRID: f64 = 64.0;
 
-/// Rounds a coordinate to tiny-skia's grid. Colours are interpolated between corners on the grid, too: a pixel is inside of
-/// those. It may be outside of the exact ones, and a plane through the corners of a sliver rises steeply there.
+/// Rounds a coordinate to tiny-skia's grid. Colours are interpolated between corners on the grid, too: a pixel is
+/// inside of those. It may be outside of the exact ones, and a plane through the corners of a sliver rises steeply
+/// there.
 pub(super) fn snap(coordinate: f64) -> f64 {
     (coordinate * GRID).round() / GRID
 }

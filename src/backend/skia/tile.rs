@@ -1,9 +1,9 @@
 //! Painting shapes into a tile with tiny-skia.
 //!
-//! A shape is cut to its tile, so that tiny-skia never clips: it clips some edges of neighbouring polygons and not others,
-//! and rounds clipped ones differently. Uncut corners are in both neighbours the same bits, cut ones too
-//! ([`viewport`](crate::geometry::viewport)); rounded to tiny-skia's grid of 1/64 pixel, they give both neighbours the
-//! same edge, and without anti-aliasing every pixel centre along it goes to exactly one of the two.
+//! A shape is cut to its tile, so that tiny-skia never clips: it clips some edges of neighbouring polygons and not
+//! others, and rounds clipped ones differently. Uncut corners are in both neighbours the same bits, cut ones too
+//! ([`viewport`](crate::geometry::viewport)); rounded to tiny-skia's grid of 1/64 pixel, they give both neighbours
+//! the same edge, and without anti-aliasing every pixel centre along it goes to exactly one of the two.
 
 use super::gradient::{Planes, Spread};
 use super::shape::{Shape, snap};
@@ -139,8 +139,8 @@ impl Tile {
     }
 }
 
-/// What to paint a shape with, the first over what is there, the others added: a gradient for each channel that varies; those
-/// that do not go with the first.
+/// What to paint a shape with, the first over what is there, the others added: a gradient for each channel that
+/// varies; those that do not go with the first.
 fn shaders(spreads: &[Spread; 3]) -> [Option<Shader<'static>>; 3] {
     let constant = spreads.map(|spread| match spread {
         Spread::Constant(code) => code,

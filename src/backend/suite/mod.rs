@@ -1,5 +1,5 @@
-//! Checks that a [`Backend`] keeps its [contract](Backend#contract), for every implementation, also those outside of this
-//! crate.
+//! Checks that a [`Backend`] keeps its [contract](Backend#contract), for every implementation, also those outside of
+//! this crate.
 //!
 //! One line in a test runs them all; what depends on [`Capabilities`] is checked as far as it is declared:
 //!
@@ -10,8 +10,8 @@
 //! ```
 //!
 //! Expectations come from slow and obvious references: the scalar raster rules of
-//! [`geometry::screen`](crate::geometry::screen), scalar interpolation, and the illumination equation in `f64`. A backend without ids
-//! is compared away from edges only, where no other triangle's pixel is near.
+//! [`geometry::screen`](crate::geometry::screen), scalar interpolation, and the illumination equation in `f64`. A
+//! backend without ids is compared away from edges only, where no other triangle's pixel is near.
 //!
 //! A check that fails panics and says what it expected. All of them take about a second.
 

@@ -3,13 +3,13 @@
 //! Only subdivision is left. It differs from refinement in place in four ways:
 //!
 //! * Nothing is shaded per pixel, so nothing is ever right for certain. A leaf is **good enough** when its estimated
-//!   error is below [`GOOD_MSE`] and it is small enough for the estimate to be believed, or when it is hardly a pixel and
-//!   not long. (Following their neighbours, leaves become slivers, of little area, that show the colours of corners far
-//!   away. Those that reach the end of the barycentric grid stay so.)
-//! * **Every** leaf follows the splits of its neighbours, also those that are good enough and those off the screen: each
-//!   is drawn, and a corner inside a neighbour's edge would be a crack. So leaves are never closed.
-//! * A split that was found not to help is carried out when the leaf's turn comes again, later: there is nothing else to
-//!   be done about it, and smaller leaves get there in the end.
+//!   error is below [`GOOD_MSE`] and it is small enough for the estimate to be believed, or when it is hardly a pixel
+//!   and not long. (Following their neighbours, leaves become slivers, of little area, that show the colours of
+//!   corners far away. Those that reach the end of the barycentric grid stay so.)
+//! * **Every** leaf follows the splits of its neighbours, also those that are good enough and those off the screen:
+//!   each is drawn, and a corner inside a neighbour's edge would be a crack. So leaves are never closed.
+//! * A split that was found not to help is carried out when the leaf's turn comes again, later: there is nothing else
+//!   to be done about it, and smaller leaves get there in the end.
 //! * Pixels are estimated by area inside the image.
 
 use super::ranking::{self, Action};
