@@ -357,3 +357,96 @@ fn an_edge_is_not_split_when_its_other_side_has_no_room_to_follow() {
     assert_eq!(outcome, PlanOutcome::Never);
     assert!(!forest.is_planted(1), "the forest is full");
 }
+
+#[test]
+fn errors_are_estimated_against_what_the_device_shows() {
+    use crate::illumination::reference;
+    use crate::output::Interpolation;
+    use crate::output::encode::encode;
+    use crate::scene::View;
+    use glam::{DMat4, DVec4};
+    let mut world = world_of(&shapes::sphere(8, 5));
+    // Smooth, so that edges tell what is inside.
+    world.materials[0].specular = [0.0; 3];
+    world.materials[0].ambient = [0.3; 3];
+    let colours = base_colours(&world);
+    // Strong perspective: w is 1.1 less the distance towards the viewer.
+    let view = View {
+        width: 100,
+        height: 80,
+        pixel_from_world: DMat4::from_cols(
+            DVec4::new(0.0, 0.0, 0.0, -1.0),
+            DVec4::new(30.0, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, -30.0, 0.0, 0.0),
+            DVec4::new(55.0, 44.0, 0.1, 1.1),
+        ),
+        eye: EYE,
+    };
+    let estimate = |declared: Interpolation| {
+        let mut forest = Forest::default();
+        forest.reset(&world);
+        forest.draw_once(exec().level, &view, declared, &colours);
+        for triangle in 0..world.triangles.len() as u32 {
+            forest.plant(&world, &colours, triangle, 10);
+        }
+        forest.illuminate(exec(), &world, EYE, &colours, &mut Vec::new());
+        let leaves = open_leaves(&forest);
+        leaves
+            .iter()
+            .map(|&id| f64::from(forest.leaf(id).error))
+            .sum::<f64>()
+    };
+    let measured = |shown: Interpolation| {
+        let mut total = 0.0;
+        for triangle in &world.triangles {
+            let at = |array: &Vec3s, weights: [f32; 3]| {
+                reference::vector(blend(weights, triangle.map(|v| array.get(v as usize))))
+            };
+            let w = triangle.map(|v| view.project(world.positions.get(v as usize))[3]);
+            for index in 0..64 {
+                let weights = super::estimate::sample_weights(index);
+                let shaded = reference::shade(
+                    at(&world.positions, weights),
+                    at(&world.normals, weights),
+                    &EYE,
+                    &world.materials[0],
+                    &world.lights,
+                );
+                let scaled: [f64; 3] = std::array::from_fn(|i| f64::from(weights[i]) * w[i]);
+                let sum: f64 = scaled.iter().sum();
+                for channel in 0..3 {
+                    let corner = |i: usize| {
+                        let colour = colours.get(triangle[i] as usize);
+                        f64::from(colour[channel])
+                    };
+                    let code = match shown {
+                        Interpolation::LinearPerspective => {
+                            encode((0..3).map(|i| f64::from(weights[i]) * corner(i)).sum())
+                        }
+                        Interpolation::EncodedAffine => {
+                            (0..3).map(|i| scaled[i] / sum * encode(corner(i))).sum()
+                        }
+                    };
+                    total += (encode(shaded.rgb[channel]) - code).powi(2) / (3.0 * 64.0);
+                }
+            }
+        }
+        total
+    };
+    let modes = [
+        Interpolation::LinearPerspective,
+        Interpolation::EncodedAffine,
+    ];
+    for declared in modes {
+        let (got, want) = (estimate(declared), measured(declared));
+        assert!(
+            (0.88..1.12).contains(&(got / want)),
+            "{declared:?}: {got} estimated, {want} measured"
+        );
+    }
+    let [linear, affine] = modes.map(measured);
+    assert!(
+        linear < 0.75 * affine,
+        "the two differ, or this shows nothing: {linear} {affine}"
+    );
+}
