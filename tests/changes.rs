@@ -3,10 +3,11 @@
 
 use glam::{DMat4, DVec3};
 use proptest::prelude::*;
+use specula::backend::recording::{Call, RecordingBackend};
 use specula::scene::{
     Camera, Changes, GeometryChange, Light, LightKind, Material, Placement, Scene, World,
 };
-use specula::{Budget, Engine, EngineOptions, Frame, FrameStats, Method};
+use specula::{BackendKind, Budget, Engine, EngineOptions, Frame, FrameStats, Method};
 
 const SIZE: (u32, u32) = (120, 90);
 
@@ -263,6 +264,43 @@ fn the_owners_of_pixels_stay_known_while_only_light_changes() {
     ] {
         edit.apply(&mut scene);
         assert_eq!(skipped(&mut engine, &scene), is_known, "{edit:?}");
+    }
+}
+
+#[test]
+fn a_device_hears_of_a_change_only_what_depends_on_it() {
+    let mut scene = scene();
+    let (backend, log) = RecordingBackend::new(BackendKind::Software.create());
+    let options = EngineOptions {
+        method: Method::Gouraud,
+        threads: Some(1),
+        ..EngineOptions::default()
+    };
+    let mut engine = Engine::with_backend(&scene, options, Box::new(backend)).expect("an engine");
+    let mut frame = Frame::new(SIZE.0, SIZE.1);
+    // Whether pixels got new owners, new colours, and were handed over.
+    let mut heard = |scene: &Scene| {
+        engine.render(scene, Budget::Unlimited, &mut frame);
+        let calls = log.take();
+        let is_any = |f: fn(&Call) -> bool| calls.iter().any(f);
+        [
+            is_any(|call| matches!(call, Call::Rasterize { .. })),
+            is_any(|call| matches!(call, Call::Resolve(_))),
+            is_any(|call| matches!(call, Call::Present { pixels } if *pixels > 0)),
+        ]
+    };
+    assert_eq!(heard(&scene), [true; 3], "the first frame");
+    assert_eq!(heard(&scene), [false; 3], "a still view");
+    for (edit, expected) in [
+        (Edit::Light(1.0), [false, true, true]),
+        (Edit::Shininess(0, 7.0), [false, true, true]),
+        (Edit::Background(0.9), [false, true, true]),
+        (Edit::Turn(2, 0.2), [true; 3]),
+        (Edit::Camera(0.3), [true; 3]),
+        (Edit::Camera(0.0), [false; 3]),
+    ] {
+        edit.apply(&mut scene);
+        assert_eq!(heard(&scene), expected, "{edit:?}");
     }
 }
 
