@@ -1,9 +1,8 @@
 //! `specula bench`: frame times over views from all around a scene.
 
 use super::Failure;
-use super::args::{Machine, count, milliseconds};
+use super::args::{Machine, count, milliseconds, name_of};
 use super::console::{Output, Progress};
-use super::sweep::name_of;
 use clap::Args;
 use specula::frame::Method;
 use specula::measure::{BenchOptions, BenchPhase, BenchReport, bench};

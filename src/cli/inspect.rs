@@ -1,10 +1,9 @@
 //! `specula inspect`: what a view consists of, in numbers and drawn over the image.
 
 use super::Failure;
-use super::args::{Machine, count, milliseconds};
+use super::args::{Machine, count, milliseconds, name_of, require_png};
 use super::console::{Output, note};
-use super::render::{label, list, require_png};
-use super::sweep::name_of;
+use super::report::{label, list};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use specula::frame::{Engine, EngineOptions, FrameStats, Method};

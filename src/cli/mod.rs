@@ -6,10 +6,12 @@
 mod animate;
 mod args;
 mod bench;
+mod command;
 mod console;
 mod inspect;
 mod machine;
 mod render;
+mod report;
 mod sweep;
 
 use clap::Parser;
@@ -80,7 +82,7 @@ impl From<EngineError> for Failure {
 
 /// Runs the program with the process's arguments.
 pub(crate) fn main() -> ExitCode {
-    let arguments = match args::Arguments::try_parse() {
+    let arguments = match command::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version come this way too. When nobody reads them there is nobody to complain to.
@@ -88,14 +90,7 @@ pub(crate) fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let result = match &arguments.command {
-        args::Command::Render(render) => render::run(render),
-        args::Command::Animate(animate) => animate::run(animate),
-        args::Command::Sweep(sweep) => sweep::run(sweep),
-        args::Command::Bench(bench) => bench::run(bench),
-        args::Command::Inspect(inspect) => inspect::run(inspect),
-    };
-    match result {
+    match arguments.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             let _ = writeln!(std::io::stderr(), "error: {failure}");

@@ -1,10 +1,12 @@
 //! `specula sweep`: error against time.
 
 use super::Failure;
-use super::args::Sweep as Arguments;
+use super::args::{Machine, count, milliseconds, name_of, not_negative};
 use super::console::{Output, Progress};
 use super::machine::cpu_model;
-use specula::measure::{Calibration, Sweep, SweepBudget, SweepOptions, SweepRow};
+use clap::Args;
+use specula::Method;
+use specula::measure::{self, Calibration, SweepBudget, SweepOptions, SweepRow};
 use specula::output::png::plain_reason;
 use specula::scene::Scene;
 use std::fs::File;
@@ -12,7 +14,113 @@ use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-pub(super) fn run(args: &Arguments) -> Result<(), Failure> {
+/// `specula sweep`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+G and P are the medians of 30 Gouraud-shaded and 30 Phong-shaded frames, measured first. A budget of
+fraction F is G + F (P - G) milliseconds: 0 buys Gouraud shading, 1 Phong shading of every pixel.
+
+Examples:
+  All methods at the default fractions:
+    specula sweep scenes/teapot.ron --methods all
+  Medians of five at two budgets, also as CSV:
+    specula sweep scenes/*.ron --budgets 2,8 --repeat 5 --csv sweep.csv
+  How an image gets better from frame to frame:
+    specula sweep scenes/teapot.ron --methods adaptive --fractions 0.1 --frames 20")]
+pub(super) struct Sweep {
+    /// Scene files (.ron) or meshes (.obj)
+    #[arg(required = true, value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
+
+    /// Methods, separated by commas: flat, gouraud, phong, adaptive, phong-area, or all
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "adaptive,phong-area",
+        value_parser = method_or_all
+    )]
+    methods: Vec<MethodOrAll>,
+
+    /// Budgets in milliseconds, separated by commas
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        value_parser = milliseconds,
+        allow_negative_numbers = true
+    )]
+    budgets: Vec<f64>,
+
+    /// Budgets as fractions of the way from Gouraud to Phong shading, separated by commas
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "0,0.05,0.1,0.2,0.4,0.8,1",
+        value_parser = fraction,
+        allow_negative_numbers = true,
+        conflicts_with = "budgets"
+    )]
+    fractions: Vec<f64>,
+
+    /// Consecutive frames of the view at each budget
+    #[arg(long, value_name = "N", default_value = "1", value_parser = count)]
+    frames: u32,
+
+    /// How often to measure each row; the one with the median frame time is kept
+    #[arg(long, value_name = "K", default_value = "1", value_parser = count)]
+    repeat: u32,
+
+    /// Also write the rows to a CSV file, each as soon as it is measured
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+
+    /// Print one JSON object per row
+    #[arg(long)]
+    json: bool,
+
+    #[command(flatten)]
+    machine: Machine,
+}
+
+impl Sweep {
+    /// The methods asked for, each once, in the order given.
+    fn methods(&self) -> Vec<Method> {
+        let mut methods = Vec::new();
+        for item in &self.methods {
+            let named = match item {
+                MethodOrAll::All => &Method::ALL[..],
+                MethodOrAll::One(method) => std::slice::from_ref(method),
+            };
+            for &method in named {
+                if !methods.contains(&method) {
+                    methods.push(method);
+                }
+            }
+        }
+        methods
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+enum MethodOrAll {
+    All,
+    One(Method),
+}
+
+fn method_or_all(text: &str) -> Result<MethodOrAll, String> {
+    match text {
+        "all" => Ok(MethodOrAll::All),
+        _ => text.parse().map(MethodOrAll::One),
+    }
+}
+
+fn fraction(text: &str) -> Result<f64, String> {
+    not_negative(text).ok_or_else(|| "a fraction is a number, 0 or more".to_owned())
+}
+
+pub(super) fn run(args: &Sweep) -> Result<(), Failure> {
     // All that can be wrong is found before a file is touched or a frame rendered.
     let scenes = args
         .scenes
@@ -56,23 +164,16 @@ pub(super) fn run(args: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What rows call a scene: the file's name without directories and ending.
-pub(super) fn name_of(path: &Path) -> String {
-    path.file_stem()
-        .map_or_else(|| path.to_string_lossy(), |stem| stem.to_string_lossy())
-        .into_owned()
-}
-
 fn sweep_scene(
     name: &str,
     scene: &Scene,
     options: &SweepOptions,
-    args: &Arguments,
+    args: &Sweep,
     report: &mut Report,
 ) -> Result<(), Failure> {
     let preparing = Progress::new(0);
     preparing.doing(format!("{name}: rendering the Phong reference"));
-    let mut sweep = Sweep::new(name, scene, options.clone())?;
+    let mut sweep = measure::Sweep::new(name, scene, options.clone())?;
     let budgets: Vec<SweepBudget> = if args.budgets.is_empty() {
         preparing.measuring(format!("{name}: measuring Gouraud and Phong frames"));
         let calibration = sweep.calibrate()?;
@@ -122,7 +223,7 @@ impl Report {
     }
 
     /// Writes what comes before all rows.
-    fn begin(&mut self, args: &Arguments) -> Result<(), Failure> {
+    fn begin(&mut self, args: &Sweep) -> Result<(), Failure> {
         if let Some(csv) = &mut self.csv {
             csv.line(&format!("# specula {} sweep", env!("CARGO_PKG_VERSION")))?;
             csv.line(&format!("# cpu: {}", cpu_model()))?;

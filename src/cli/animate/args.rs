@@ -1,6 +1,6 @@
 //! What can be said to `specula animate`.
 
-use crate::cli::args::{Machine, milliseconds};
+use crate::cli::args::{Machine, milliseconds, time};
 use clap::Args;
 use specula::frame::Method;
 use specula::output::FrameRate;
@@ -80,14 +80,6 @@ pub(in crate::cli) struct Animate {
 
     #[command(flatten)]
     pub(super) machine: Machine,
-}
-
-/// A point of time, not negative.
-pub(in crate::cli) fn time(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|seconds| (0.0..=MAX_DURATION_S).contains(seconds))
-        .ok_or_else(|| format!("a time is a number of seconds from 0 to {MAX_DURATION_S}"))
 }
 
 fn duration(text: &str) -> Result<f64, String> {

@@ -4,11 +4,11 @@ mod args;
 mod film;
 mod summary;
 
-pub(super) use args::{Animate, time};
+pub(super) use args::Animate;
 
 use super::Failure;
 use super::console::{Output, Progress, note};
-use super::render::frame_json;
+use super::report::frame_json;
 use film::{Destination, Film};
 use serde_json::json;
 use specula::frame::{Engine, EngineOptions, FrameStats};

@@ -1,0 +1,197 @@
+//! What is said of a frame, on the screen and to other programs.
+
+use serde_json::{Map, Value, json};
+use specula::frame::{FrameStats, StageTimes};
+use specula::measure::ErrorReport;
+use specula::schedule::Budget;
+
+/// What a counter of skipped things is called on the screen.
+pub(super) fn label(name: &str) -> String {
+    match name {
+        "triangles_off_screen" => "triangles off screen or between pixels".to_owned(),
+        _ => name.replace('_', " "),
+    }
+}
+
+/// What is printed of a frame.
+#[derive(Debug)]
+pub(super) struct FrameReport {
+    /// Counted from 1.
+    pub(super) number: u32,
+    pub(super) stats: FrameStats,
+    /// The difference from the reference, if it was asked for.
+    pub(super) error: Option<ErrorReport>,
+}
+
+/// The statistics of a frame as one object; what it does not have is null.
+pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
+    let (budget_ms, budget_work) = match stats.budget {
+        Budget::Millis(ms) => (Some(ms), None),
+        Budget::Work(units) => (None, Some(units)),
+        Budget::Unlimited => (None, None),
+    };
+    let stages: Map<String, Value> = stages(&stats.stage_ms)
+        .into_iter()
+        .map(|(name, ms)| (name.to_owned(), json!(ms)))
+        .collect();
+    let skipped: Map<String, Value> = stats
+        .skipped
+        .entries()
+        .into_iter()
+        .map(|(name, count)| (name.to_owned(), json!(count)))
+        .collect();
+    json!({
+        "frame": number,
+        "frame_ms": stats.frame_ms,
+        "budget_ms": budget_ms,
+        "budget_work": budget_work,
+        "overshoot_ms": stats.overshoot_ms(),
+        "outcome": stats.outcome.name(),
+        "converged": stats.converged,
+        "estimated_error": stats.estimated_error,
+        "triangles": stats.triangles,
+        "triangles_drawn": stats.triangles_drawn,
+        "triangles_visible": stats.triangles_visible,
+        "pht": stats.pht,
+        "pht_visible": stats.pht_visible,
+        "refined": stats.refined,
+        "triangles_subdivided": stats.triangles_subdivided,
+        "leaves": stats.leaves,
+        "phong_pixels": stats.phong_pixels,
+        "work_units": stats.work_units,
+        "pixels_written": stats.pixels_written,
+        "stage_ms": stages,
+        "skipped": skipped,
+    })
+}
+
+impl FrameReport {
+    /// One object.
+    pub(super) fn json(&self) -> Value {
+        let mut object = frame_json(self.number, &self.stats);
+        if let (Some(error), Some(object)) = (self.error, object.as_object_mut()) {
+            object.insert("error".to_owned(), json!(error));
+        }
+        object
+    }
+
+    /// A block of lines.
+    pub(super) fn text(&self) -> String {
+        let stats = &self.stats;
+        let mut lines = vec![
+            self.headline(),
+            format!(
+                "  stages     {}",
+                list(stages(&stats.stage_ms).map(|(name, ms)| format!("{name} {ms:.2}"))) + " ms"
+            ),
+            format!(
+                "  triangles  {} in the scene, {} drawn, {} visible, {} subdivided; {} leaves open",
+                stats.triangles,
+                stats.triangles_drawn,
+                stats.triangles_visible,
+                stats.triangles_subdivided,
+                stats.leaves
+            ),
+            format!(
+                "  highlights {} PHTs found, {} visible, {} refined; {} pixels shaded by Phong",
+                stats.pht, stats.pht_visible, stats.refined, stats.phong_pixels
+            ),
+            format!("  skipped    {}", self.skipped()),
+        ];
+        if stats.estimated_error.is_finite() {
+            lines.push(format!(
+                "  error      about {:.2} codes (estimate)",
+                stats.estimated_error
+            ));
+        }
+        if let Some(error) = &self.error {
+            lines.push(measured(error));
+        }
+        lines.join("\n")
+    }
+
+    fn headline(&self) -> String {
+        let stats = &self.stats;
+        let budget = match stats.budget {
+            Budget::Millis(ms) => {
+                let late = stats.frame_ms - ms;
+                let verdict = if late > 0.0 {
+                    format!("{late:.2} ms late")
+                } else {
+                    "in time".to_owned()
+                };
+                format!(", budget {ms:.2} ms: {verdict}")
+            }
+            Budget::Work(units) => format!(", {} of {units} work units", stats.work_units),
+            Budget::Unlimited => String::new(),
+        };
+        let converged = if stats.converged { ", converged" } else { "" };
+        format!(
+            "frame {}: {} in {:.2} ms{budget}{converged}",
+            self.number,
+            stats.outcome.name().replace('_', " "),
+            stats.frame_ms
+        )
+    }
+
+    /// The counters that are not zero.
+    fn skipped(&self) -> String {
+        let counted = self
+            .stats
+            .skipped
+            .entries()
+            .into_iter()
+            .filter(|&(_, count)| count > 0)
+            .map(|(name, count)| format!("{} {count}", label(name)));
+        let text = list(counted);
+        if text.is_empty() {
+            "nothing".to_owned()
+        } else {
+            text
+        }
+    }
+}
+
+/// Names and milliseconds of the stages.
+fn stages(stages: &StageTimes) -> [(&'static str, f64); 6] {
+    let StageTimes {
+        cull,
+        shade,
+        classify,
+        raster,
+        refine,
+        resolve,
+    } = *stages;
+    [
+        ("cull", cull),
+        ("shade", shade),
+        ("classify", classify),
+        ("raster", raster),
+        ("refine", refine),
+        ("resolve", resolve),
+    ]
+}
+
+/// The line about a comparison with the reference.
+fn measured(error: &ErrorReport) -> String {
+    let psnr = if error.psnr_db.is_finite() {
+        format!("psnr {:.2} dB", error.psnr_db)
+    } else {
+        "equal to the reference".to_owned()
+    };
+    format!(
+        "  measured   rmse {:.3} codes, {psnr}, max {}, p99 {}, {:.2} % of {} pixels off by more than 1 code, \
+         {:.2} % by more than 4, {} pixels left out",
+        error.rmse,
+        error.max,
+        error.p99,
+        error.share_above_1 * 100.0,
+        error.covered_pixels,
+        error.share_above_4 * 100.0,
+        error.excluded_pixels
+    )
+}
+
+pub(super) fn list(items: impl IntoIterator<Item = String>) -> String {
+    items.into_iter().collect::<Vec<_>>().join(", ")
+}
