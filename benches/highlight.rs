@@ -17,7 +17,6 @@ fn patch(model: ReflectionModel, lights: usize) -> World {
             specular: [0.4; 3],
             shininess: 20.0,
             model,
-            two_sided: false,
         }],
         ..World::default()
     };

@@ -37,7 +37,6 @@ fn shading(c: &mut Criterion) {
             specular: [0.4; 3],
             shininess,
             model,
-            two_sided: false,
         };
         let mut group = c.benchmark_group(name);
         for count in [1, 4, 16] {

@@ -234,6 +234,11 @@ fn each_change_costs_what_depends_on_it() {
     // What shows its back has to be drawn.
     assert_eq!(update(Edit::Sides(0, true)).geometry, replaced);
     assert_eq!(update(Edit::Assign(teapot, 1)), changes(none, true, false));
+    assert_eq!(update(Edit::Sides(0, false)).geometry, replaced);
+    assert_eq!(update(Edit::Sides(0, false)).geometry, none);
+    assert_eq!(update(Edit::Assign(teapot, 0)).geometry, replaced);
+    assert_eq!(update(Edit::Assign(teapot, 0)).geometry, none);
+    assert_eq!(update(Edit::Assign(teapot, 1)).geometry, replaced);
     // A cube is welded to its neighbour only where it was at first.
     assert_eq!(update(Edit::Turn(0, 0.5)).geometry, replaced);
     assert_eq!(update(Edit::Turn(0, 0.5)).geometry, moved);

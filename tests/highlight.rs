@@ -112,7 +112,6 @@ fn random_case(random: &mut Random, lights: usize) -> Case {
             _ => random.between(1.0, 1e3) as f32,
         },
         model,
-        two_sided: random.below(4) == 0,
     };
     let lights = (0..lights)
         .map(|_| {
@@ -344,7 +343,6 @@ fn deviations_are_of_second_order() {
         specular: [0.3; 3],
         shininess: 20.0,
         model: ReflectionModel::Phong,
-        two_sided: false,
     };
     let light = ShadingLight {
         vector: [1.0, 1.0, 3.0],
@@ -381,7 +379,6 @@ fn sphere(rings: usize, shininess: f32, light: DVec3) -> World {
             specular: [1.0; 3],
             shininess,
             model: ReflectionModel::Phong,
-            two_sided: false,
         }],
         lights: vec![ShadingLight {
             vector: single(light),

@@ -67,7 +67,6 @@ fn random_case(random: &mut Random, shininess: f32, len: usize) -> Case {
         specular: random.rgb(),
         shininess,
         model: [ReflectionModel::Phong, ReflectionModel::BlinnPhong][random.below(2)],
-        two_sided: random.below(2) == 0,
     };
     let lights: Vec<_> = (0..random.below(4))
         .map(|_| {
@@ -264,47 +263,44 @@ fn degenerate_geometry_is_dark_and_finite() {
         [0.0, 1e10, 0.0],
     ];
     for model in [ReflectionModel::Phong, ReflectionModel::BlinnPhong] {
-        for two_sided in [false, true] {
-            for shininess in [0.0, 1.0, 30.0, 1e4, 1e30] {
-                for eye in [
-                    Eye::Point([0.0; 3]),
-                    Eye::Point([0.0, 0.0, 1.0]),
-                    Eye::Direction([0.0, 0.0, 1.0]),
+        for shininess in [0.0, 1.0, 30.0, 1e4, 1e30] {
+            for eye in [
+                Eye::Point([0.0; 3]),
+                Eye::Point([0.0, 0.0, 1.0]),
+                Eye::Direction([0.0, 0.0, 1.0]),
+            ] {
+                let mut case = Case {
+                    eye,
+                    material: ShadingMaterial {
+                        ambient: [0.01; 3],
+                        diffuse: [0.5; 3],
+                        specular: [0.5; 3],
+                        shininess,
+                        model,
+                    },
+                    lights: vec![],
+                    points: Vec3s::default(),
+                    normals: Vec3s::default(),
+                };
+                for (vector, is_point) in [
+                    ([0.0; 3], true),
+                    ([0.0, 0.0, 1.0], true),
+                    ([0.0, 0.0, -1.0], false),
+                    ([0.0, 1.0, 0.0], false),
                 ] {
-                    let mut case = Case {
-                        eye,
-                        material: ShadingMaterial {
-                            ambient: [0.01; 3],
-                            diffuse: [0.5; 3],
-                            specular: [0.5; 3],
-                            shininess,
-                            model,
-                            two_sided,
-                        },
-                        lights: vec![],
-                        points: Vec3s::default(),
-                        normals: Vec3s::default(),
-                    };
-                    for (vector, is_point) in [
-                        ([0.0; 3], true),
-                        ([0.0, 0.0, 1.0], true),
-                        ([0.0, 0.0, -1.0], false),
-                        ([0.0, 1.0, 0.0], false),
-                    ] {
-                        case.lights.push(ShadingLight {
-                            vector,
-                            is_point,
-                            radiance: [0.5; 3],
-                        });
-                    }
-                    for point in [[0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 0.5]] {
-                        for normal in axes {
-                            case.points.push(point);
-                            case.normals.push(normal);
-                        }
-                    }
-                    check_degenerate(&case);
+                    case.lights.push(ShadingLight {
+                        vector,
+                        is_point,
+                        radiance: [0.5; 3],
+                    });
                 }
+                for point in [[0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 0.5]] {
+                    for normal in axes {
+                        case.points.push(point);
+                        case.normals.push(normal);
+                    }
+                }
+                check_degenerate(&case);
             }
         }
     }

@@ -58,10 +58,10 @@ fn many_small_triangles_are_drawn_the_same_by_one_thread_and_by_two() {
             ]
         };
         let corners = [corner(), corner(), corner()];
-        add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3], 1);
+        add_both_sides(&mut world, corners, [[0.0, 0.0, 1.0]; 3]);
     }
     let view = flat(300, 200);
-    let want = reference(&world, &view, 0..5000);
+    let want = reference(&world, &view, 0..10_000);
     let mut backend = SoftwareBackend::new();
     rasterize(&mut backend, best(), &world, &view);
     Visibility::of(&backend).assert_same(&want, 300, "one thread");
@@ -111,7 +111,7 @@ fn the_order_of_triangles_does_not_matter() {
     for _ in 0..4 {
         let mut world = empty_world();
         for &c in &corners {
-            add_triangle(&mut world, c, [[0.0, 0.0, 1.0]; 3], 1);
+            add_both_sides(&mut world, c, [[0.0, 0.0, 1.0]; 3]);
         }
         let mut backend = SoftwareBackend::new();
         rasterize(&mut backend, best(), &world, &view);
@@ -119,7 +119,8 @@ fn the_order_of_triangles_does_not_matter() {
         for (id, depth) in image.ids.iter().zip(&image.depths) {
             if *id != NO_TRIANGLE {
                 assert_eq!(
-                    *depth, corners[*id as usize][0][2],
+                    *depth,
+                    corners[*id as usize / 2][0][2],
                     "the owner is the one at that depth"
                 );
             }
@@ -137,7 +138,7 @@ fn of_equally_near_triangles_the_smaller_id_wins() {
     let mut world = empty_world();
     let corners = [[10.0, 10.0, 0.0], [10.0, 90.0, 0.0], [90.0, 10.0, 0.0]];
     for _ in 0..3 {
-        add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3], 0);
+        add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3]);
     }
     let view = flat(100, 100);
     let mut backend = SoftwareBackend::new();
@@ -215,7 +216,6 @@ fn triangles_of_a_fan_cover_each_pixel_around_the_hub_once() {
                 &mut world,
                 [[hub[0], hub[1], 0.5], q, p],
                 [[0.0, 0.0, 1.0]; 3],
-                0,
             );
         }
         let sum = coverage(&world, &flat(80, 80));
@@ -260,11 +260,11 @@ fn a_mesh_over_the_whole_image_covers_each_pixel_once_whichever_way_it_is_cut() 
                     [[a, b, d], [a, d, c]]
                 };
                 for mut half in halves {
-                    // Material 1 is two-sided: the winding must not matter.
+                    // With both sides the winding must not matter.
                     if random.below(2) == 0 {
                         half.swap(0, 1);
                     }
-                    add_triangle(&mut world, half, [[0.0, 0.0, 1.0]; 3], 1);
+                    add_both_sides(&mut world, half, [[0.0, 0.0, 1.0]; 3]);
                 }
             }
         }
@@ -300,7 +300,7 @@ fn a_floor_through_the_near_plane_and_the_guard_band_covers_each_pixel_below_the
                 let at = |di: usize, dj: usize| points[(j + dj) * (columns + 1) + i + di];
                 let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
                 for half in [[a, b, c], [b, d, c]] {
-                    add_triangle(&mut world, half, [[0.0, -1.0, 0.0]; 3], 1);
+                    add_both_sides(&mut world, half, [[0.0, -1.0, 0.0]; 3]);
                 }
             }
         }
@@ -321,19 +321,20 @@ fn a_floor_through_the_near_plane_and_the_guard_band_covers_each_pixel_below_the
 }
 
 #[test]
-fn back_faces_are_culled_unless_two_sided() {
+fn only_the_side_that_faces_the_viewer_is_drawn() {
     let view = flat(50, 50);
     // The y axis points down, so this turns counter-clockwise as seen.
     let front = [[10.0, 10.0, 0.5], [10.0, 40.0, 0.5], [40.0, 10.0, 0.5]];
     let back = [front[0], front[2], front[1]];
-    for (corners, material, drawn, back_facing) in [
-        (front, 0, 1, 0),
-        (back, 0, 0, 1),
-        (front, 1, 1, 0),
-        (back, 1, 1, 0),
+    for (corners, both, drawn, back_facing) in [
+        (front, false, 1, 0),
+        (back, false, 0, 1),
+        (front, true, 1, 1),
+        (back, true, 1, 1),
     ] {
         let mut world = empty_world();
-        add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3], material);
+        let add = if both { add_both_sides } else { add_triangle };
+        add(&mut world, corners, [[0.0, 0.0, 1.0]; 3]);
         let counts = rasterize(&mut SoftwareBackend::new(), best(), &world, &view);
         assert_eq!((counts.drawn, counts.back_facing), (drawn, back_facing));
     }
@@ -344,16 +345,15 @@ fn impossible_coordinates_draw_nothing_and_do_not_panic() {
     let view = perspective(60, 40, 40.0, 0.1, 50.0);
     for odd in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
         let mut world = empty_world();
-        add_triangle(&mut world, [[odd; 3]; 3], [[0.0, 0.0, 1.0]; 3], 1);
-        add_triangle(
+        add_both_sides(&mut world, [[odd; 3]; 3], [[0.0, 0.0, 1.0]; 3]);
+        add_both_sides(
             &mut world,
             [[0.0, 0.0, 1.0], [odd, 1.0, 1.0], [0.0, 1.0, odd]],
             [[0.0, 0.0, 1.0]; 3],
-            1,
         );
         let mut backend = SoftwareBackend::new();
         rasterize(&mut backend, best(), &world, &view);
-        let all = 0..2;
+        let all = 0..4;
         let geometry = geometry(&world, &view, std::slice::from_ref(&all));
         backend.resolve(best(), geometry, BasePaint::Phong);
         Frame::new(60, 40).write(|target| backend.present(best(), target));
@@ -377,16 +377,14 @@ fn the_widest_image_is_exact_to_its_far_corner() {
         &mut world,
         [[-far, -far, 0.0], [far, 1.0, 1.0], [-far, far, 0.25]],
         [[0.0, 0.0, 1.0]; 3],
-        0,
     );
-    add_triangle(
+    add_both_sides(
         &mut world,
         [[far, 5.0, 0.3], [3.0, 3.3, 0.9], [16300.0, 1.0, 0.5]],
         [[0.0, 0.0, 1.0]; 3],
-        1,
     );
     let view = flat(16384, 5);
-    let want = reference(&world, &view, 0..2);
+    let want = reference(&world, &view, 0..3);
     let mut backend = SoftwareBackend::new();
     for exec in levels() {
         rasterize(&mut backend, exec, &world, &view);
@@ -409,8 +407,11 @@ fn colourful(random: &mut Random) -> (World, Vec3s) {
         let corners = [corner(), corner(), corner()];
         let mut normal = || [random.range(-0.5, 0.5), random.range(-0.5, 0.5), -1.0];
         let normals = [normal(), normal(), normal()];
-        add_triangle(&mut world, corners, normals, 1);
-        (0..3).for_each(|_| colours.push(random.rgb()));
+        // Whichever way it turns, it is seen with normals that point to the viewer.
+        let ([a, b, c], [l, m, n]) = (corners, normals);
+        add_triangle(&mut world, [a, b, c], [l, m, n]);
+        add_triangle(&mut world, [a, c, b], [l, n, m]);
+        (0..6).for_each(|_| colours.push(random.rgb()));
     }
     (world, colours)
 }
@@ -466,7 +467,7 @@ fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
                                     to_f64(mix(&world.positions)),
                                     to_f64(mix(&world.normals)),
                                     &view.eye,
-                                    &world.materials[1],
+                                    &world.materials[0],
                                     &world.lights,
                                 );
                                 at_horizon = shaded.smallest_cosine < 1e-4;
@@ -527,7 +528,6 @@ fn frames_receive_exactly_the_tiles_that_changed() {
         &mut world,
         [[5.0, 5.0, 0.5], [5.0, 50.0, 0.5], [50.0, 5.0, 0.5]],
         [[0.0, 0.0, 1.0]; 3],
-        0,
     );
     let all = 0..1;
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));

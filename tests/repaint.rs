@@ -88,7 +88,7 @@ fn worlds(random: &mut Random) -> Vec<(World, View)> {
         [[70.0, 10.0, 0.9], [140.0, 10.4, 0.9], [70.0, 10.9, 0.9]],
     ];
     for corners in on_grid {
-        add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3], 1);
+        add_both_sides(&mut world, corners, [[0.0, 0.0, 1.0]; 3]);
     }
     all.push((world, flat(150, 80)));
     all
@@ -188,13 +188,13 @@ fn no_pixel_is_lost_where_patches_are_as_fine_as_the_grid() {
     let mut world = empty_world();
     let corners = [
         [-16000.0, -15000.0, 0.5],
-        [16000.0, -8000.0, 0.5],
         [-9000.0, 16000.0, 0.5],
+        [16000.0, -8000.0, 0.5],
     ];
-    add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3], 1);
+    add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3]);
     let mut deep = empty_world();
-    let corners = [[-0.4, -0.3, 0.011], [8.0, -1.0, 2.0], [-90.0, 95.0, 49.0]];
-    add_triangle(&mut deep, corners, [[0.0, 0.0, -1.0]; 3], 1);
+    let corners = [[-0.4, -0.3, 0.011], [-90.0, 95.0, 49.0], [8.0, -1.0, 2.0]];
+    add_triangle(&mut deep, corners, [[0.0, 0.0, -1.0]; 3]);
     for (world, view) in [
         (world, flat(120, 90)),
         (deep, perspective(120, 90, 90.0, 0.01, 50.0)),
@@ -267,7 +267,7 @@ fn colours_never_leave_the_range_of_a_patch_however_small() {
     let mut random = Random(13);
     let mut world = empty_world();
     let corners = [[0.0, 0.0, 0.5], [150.0, 3.0, 0.5], [5.0, 90.0, 0.5]];
-    add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3], 0);
+    add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3]);
     let (view, all) = (flat(150, 90), 0..1);
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
     let mut backend = SoftwareBackend::new();
@@ -345,7 +345,7 @@ fn phong_on_whole_triangles_is_the_phong_image_to_the_last_bit() {
 fn without_lights_ambient_and_the_remainder_are_left() {
     let mut world = empty_world();
     let corners = [[0.0, 0.0, 0.5], [80.0, 0.0, 0.5], [0.0, 60.0, 0.5]];
-    add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3], 0);
+    add_triangle(&mut world, corners, [[0.0, 0.0, 1.0]; 3]);
     let (view, all) = (flat(90, 70), 0..1);
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
     let remainder = [[0.1, 0.5, 0.9], [0.8, 0.2, 0.3], [0.0, 0.4, 0.7]];

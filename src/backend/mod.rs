@@ -80,7 +80,7 @@ pub struct Geometry<'a> {
 pub struct RasterCounts {
     /// Triangles handed in: the sum of `back_facing`, `off_screen` and `drawn`.
     pub submitted: u64,
-    /// Those that faced away and were not two-sided.
+    /// Those that faced away.
     pub back_facing: u64,
     /// Those outside of the view, or between pixel centres.
     pub off_screen: u64,

@@ -35,17 +35,8 @@ pub(super) struct BaseImage {
 
 impl BaseImage {
     pub(super) fn new(world: &World) -> Self {
-        let two_sided = |first: u32| {
-            let material = world.triangle_material[first as usize];
-            world.materials[usize::from(material)].two_sided
-        };
-        let sides: Vec<bool> = world
-            .clusters
-            .iter()
-            .map(|cluster| two_sided(cluster.triangles.start))
-            .collect();
         Self {
-            culler: Culler::new(&world.clusters, &sides),
+            culler: Culler::new(&world.clusters),
             visible: Vec::new(),
             colours: Vec3s::default(),
             signs: SignBits::default(),

@@ -118,7 +118,7 @@ pub struct FrameStats {
     /// Estimated root mean square difference from per-pixel Phong shading, in 8-bit codes over covered pixels; 0
     /// for [`Method::Phong`](super::Method::Phong). NaN for flat and Gouraud shading, where nothing is estimated.
     pub estimated_error: f64,
-    /// Triangles of the scene.
+    /// Triangles of the scene; those of two-sided materials count twice, as fronts and as backs.
     pub triangles: u64,
     /// Triangles sent to the rasterizer's tiles for this image.
     pub triangles_drawn: u64,

@@ -44,6 +44,18 @@ pub struct Cluster {
     pub min_altitude: f32,
 }
 
+impl Cluster {
+    /// The same triangles seen from behind: with the opposite winding, and numbers greater by `shift`.
+    #[must_use]
+    pub fn turned(&self, shift: u32) -> Self {
+        Self {
+            triangles: self.triangles.start + shift..self.triangles.end + shift,
+            cone_axis: self.cone_axis.map(|c| -c),
+            ..*self
+        }
+    }
+}
+
 /// Reorders the triangles of one object so that consecutive ones are close together, and cuts them into clusters, whose
 /// ranges begin at `first_triangle`.
 ///

@@ -19,8 +19,6 @@
 //! `s (s-1) c^(s-2) / 8` times the square of the corner values' range (the variance of a quantity is at most a quarter of its squared
 //! range), both at the greatest `c`; for `s >= 2`, where the clamped power has a continuous slope.
 //!
-//! **Two-sided** normals turn to the viewer: forwards or backwards where that is proved, else the hull of both.
-//!
 //! Nothing here depends on the machine: decisions are based on it.
 
 use super::cone::{Angle, Directions, PAD, Varying, greatest, least};
@@ -48,16 +46,6 @@ impl FactorBound {
         hi: 1.0,
         deviation: 1.0,
     };
-
-    /// Holds for a factor that obeys one of the two, at each point and corner.
-    fn hull(self, other: Self) -> Self {
-        let (lo, hi) = (self.lo.min(other.lo), self.hi.max(other.hi));
-        Self {
-            lo,
-            hi,
-            deviation: hi - lo,
-        }
-    }
 }
 
 /// Both factors of a light on a triangle.
@@ -69,15 +57,6 @@ pub struct LightBound {
     pub specular: FactorBound,
 }
 
-impl LightBound {
-    fn hull(self, other: Self) -> Self {
-        Self {
-            diffuse: self.diffuse.hull(other.diffuse),
-            specular: self.specular.hull(other.specular),
-        }
-    }
-}
-
 /// A triangle made ready for bounding one light after the other.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleBound {
@@ -87,8 +66,6 @@ pub struct TriangleBound {
     normal: Directions,
     /// The cosine between normal and viewer.
     n_v: Varying,
-    /// Whether the normal may be turned on a part of the triangle only.
-    either_side: bool,
     to_viewer: Directions,
     specular: bool,
     model: ReflectionModel,
@@ -111,18 +88,13 @@ impl TriangleBound {
             Eye::Point(eye) => Directions::new(from_corners(vector(eye), &corners), blur),
             Eye::Direction(direction) => Directions::constant(vector(direction)),
         };
-        let mut normal = Directions::new(triple(normals), 0.0);
-        let mut n_v = Varying::cosine(&normal, &to_viewer);
-        if material.two_sided && n_v.hi < 0.0 {
-            normal = normal.reversed();
-            n_v = n_v.negated();
-        }
+        let normal = Directions::new(triple(normals), 0.0);
+        let n_v = Varying::cosine(&normal, &to_viewer);
         Self {
             corners,
             blur,
             normal,
             n_v,
-            either_side: material.two_sided && n_v.lo <= 0.0,
             to_viewer,
             specular: material.is_specular(),
             model: material.model,
@@ -140,42 +112,26 @@ impl TriangleBound {
         } else {
             ([at; 3], 0.0)
         };
-        if !self.either_side && self.normal.face_away_from(&vectors, blur) {
+        if self.normal.face_away_from(&vectors, blur) {
             return LightBound::default();
         }
         let to_light = Directions::new(vectors, blur);
-        let bound = self.light_on_side(&to_light, &self.normal, &self.n_v);
-        if self.either_side {
-            let (normal, n_v) = (self.normal.reversed(), self.n_v.negated());
-            bound.hull(self.light_on_side(&to_light, &normal, &n_v))
-        } else {
-            bound
-        }
-    }
-
-    fn light_on_side(&self, l: &Directions, n: &Directions, n_v: &Varying) -> LightBound {
-        let n_l = Varying::cosine(n, l);
+        let n_l = Varying::cosine(&self.normal, &to_light);
         if n_l.hi <= 0.0 {
             return LightBound::default();
         }
         LightBound {
             diffuse: clamped(&n_l),
             specular: if self.specular {
-                self.specular(l, n, n_v, &n_l)
+                self.specular(&to_light, &n_l)
             } else {
                 FactorBound::default()
             },
         }
     }
 
-    fn specular(
-        &self,
-        l: &Directions,
-        n: &Directions,
-        n_v: &Varying,
-        n_l: &Varying,
-    ) -> FactorBound {
-        let v = &self.to_viewer;
+    fn specular(&self, l: &Directions, n_l: &Varying) -> FactorBound {
+        let (n, v, n_v) = (&self.normal, &self.to_viewer, &self.n_v);
         let (lo, hi) = match self.model {
             ReflectionModel::Phong => reflected_cone(l, n, v),
             ReflectionModel::BlinnPhong => halfway_cone(l, n, v),

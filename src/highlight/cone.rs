@@ -191,15 +191,6 @@ impl Directions {
             pad: PAD,
         }
     }
-
-    /// The opposite directions.
-    pub(super) fn reversed(&self) -> Self {
-        Self {
-            unit: self.unit.map(|v| -v),
-            axis: -self.axis,
-            ..*self
-        }
-    }
 }
 
 /// A quantity as it varies over a triangle.
@@ -245,17 +236,6 @@ impl Varying {
             apart.minus(spread).cos,
             deviation(x, y, at),
         )
-    }
-
-    /// The same with the opposite sign.
-    pub(super) fn negated(&self) -> Self {
-        let [a, b, c] = self.at;
-        Self {
-            at: [-a, -b, -c],
-            lo: -self.hi,
-            hi: -self.lo,
-            deviation: self.deviation,
-        }
     }
 
     /// Bound of the deviation of the product with another from the interpolation of its corner values: with both written as

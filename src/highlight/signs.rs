@@ -17,8 +17,6 @@
 //! Products and sums are rounded one by one and in the same order at every SIMD level, so the bits are the same on all machines,
 //! and parallel vectors give exact zeroes. Where products leave the range of `f32` (lengths beyond 1e9, or below
 //! 1e-10) a bit may be wrong; nothing relies on it but a classification.
-//!
-//! Normals of two-sided materials are turned towards the viewer first.
 
 use crate::illumination::batch::{MAX_LANES, gather};
 use crate::illumination::{LightMask, MAX_LIGHTS};
@@ -89,25 +87,11 @@ fn signs_of_list<S: Simd>(simd: S, world: &World, eye: Eye, vertices: &[u32], bi
             *place = vertex as usize;
         }
         let point = gather(simd, &world.positions, &places);
-        let mut normal = gather(simd, &world.normals, &places);
+        let normal = gather(simd, &world.normals, &places);
         let to_viewer = match eye {
             Eye::Point(eye) => towards(simd, eye, point),
             Eye::Direction(direction) => splat3(simd, direction),
         };
-        let zero = S::f32s::splat(simd, 0.0);
-        let mut two_sided = [0.0; MAX_LANES];
-        for (flag, &place) in two_sided.iter_mut().zip(&places) {
-            let material = world.vertex_material[place];
-            *flag = f32::from(world.materials[usize::from(material)].two_sided);
-        }
-        let two_sided = S::f32s::from_slice(simd, &two_sided[..S::f32s::LEN]);
-        let turned = dot::<S>(to_viewer, normal).simd_lt(zero) & two_sided.simd_gt(zero);
-        normal = [
-            turned.select(-normal[0], normal[0]),
-            turned.select(-normal[1], normal[1]),
-            turned.select(-normal[2], normal[2]),
-        ];
-
         for (planes, lights) in bits.words.iter_mut().zip(world.lights.chunks(WORD_LIGHTS)) {
             let words = signs_of_lights(simd, lights, point, normal, to_viewer);
             for (plane, word) in planes.iter_mut().zip(words) {
@@ -194,17 +178,8 @@ mod tests {
     use glam::DVec3;
 
     /// Section 2.3 in double precision, with normalized vectors and cosines: `[h1, h2]` as signed values, and *back*.
-    fn by_angles(
-        point: DVec3,
-        mut n: DVec3,
-        eye: &Eye,
-        two_sided: bool,
-        light: &ShadingLight,
-    ) -> ([f64; 2], bool) {
+    fn by_angles(point: DVec3, n: DVec3, eye: &Eye, light: &ShadingLight) -> ([f64; 2], bool) {
         let (l, v) = (towards_light(point, light), towards_viewer(point, eye));
-        if two_sided && n.dot(v) < 0.0 {
-            n = -n;
-        }
         let n = n.normalize_or_zero();
         let (cos_phi, cos_theta) = (l.dot(n), v.dot(n));
         (
@@ -213,7 +188,7 @@ mod tests {
         )
     }
 
-    fn world(lights: usize, two_sided: bool) -> World {
+    fn world(lights: usize) -> World {
         let mut state = 7_u64;
         let mut next = move || {
             state = state
@@ -228,7 +203,6 @@ mod tests {
                 specular: [1.0; 3],
                 shininess: 10.0,
                 model: ReflectionModel::Phong,
-                two_sided,
             }],
             ..World::default()
         };
@@ -249,8 +223,8 @@ mod tests {
 
     #[test]
     fn bits_are_those_of_the_angles_at_every_level() {
-        for (lights, two_sided) in [(1, false), (5, true), (33, false), (128, false)] {
-            let world = world(lights, two_sided);
+        for lights in [1, 5, 33, 128] {
+            let world = world(lights);
             let list: Vec<u32> = (0..301).filter(|v| v % 5 != 1).collect();
             for eye in [
                 Eye::Point([0.5, -2.0, 1.0]),
@@ -270,7 +244,7 @@ mod tests {
                         for (index, light) in world.lights.iter().enumerate() {
                             let point = vector(world.positions.get(v as usize));
                             let normal = vector(world.normals.get(v as usize));
-                            let (values, back) = by_angles(point, normal, &eye, two_sided, light);
+                            let (values, back) = by_angles(point, normal, &eye, light);
                             let bit = |plane: usize| {
                                 bits.words[index / 32][plane][v as usize] >> (index % 32) & 1 == 1
                             };
@@ -294,7 +268,7 @@ mod tests {
     /// Fig. 7 of the paper: a flat triangle around the point where light reflects towards the viewer passes.
     #[test]
     fn a_triangle_around_a_mirror_point_passes_and_one_far_off_does_not() {
-        let mut world = world(1, false);
+        let mut world = world(1);
         world.positions.clear();
         world.normals.clear();
         for shift in [0.0, 5.0] {

@@ -104,9 +104,9 @@ pub fn shade_lanes<S: Simd>(
     let material = kit.material;
     let specular = LightMask(active.specular.0 & kit.specular.0);
 
-    let (mut n, _) = normalize(simd, normal);
-    // Without highlights nobody asks where the viewer is, unless normals turn to him.
-    let (v, seen) = if specular.is_empty() && !material.two_sided {
+    let (n, _) = normalize(simd, normal);
+    // Without highlights nobody asks where the viewer is.
+    let (v, seen) = if specular.is_empty() {
         ([zero; 3], S::mask32s::splat(simd, false))
     } else {
         let (v, squared) = match kit.eye {
@@ -115,14 +115,6 @@ pub fn shade_lanes<S: Simd>(
         };
         (v, squared.simd_gt(zero))
     };
-    if material.two_sided {
-        let away = dot::<S>(n, v).simd_lt(zero);
-        n = [
-            away.select(-n[0], n[0]),
-            away.select(-n[1], n[1]),
-            away.select(-n[2], n[2]),
-        ];
-    }
 
     let mut diffuse_sum = [zero; 3];
     let mut specular_sum = [zero; 3];

@@ -187,7 +187,6 @@ mod tests {
             specular: [0.0; 3],
             shininess: 1.0,
             model: crate::scene::ReflectionModel::Phong,
-            two_sided: false,
         };
         let world = World {
             materials: vec![material(0.25), material(0.75)],

@@ -6,8 +6,7 @@
 //!
 //! with `n`, `l`, `v` the unit surface normal and the unit vectors to light and viewer. `S` is zero where `n.l <= 0`,
 //! else `max(0, r.v)^shininess` (Phong; `r = 2 (n.l) n - l`) or `max(0, n.h)^shininess` (Blinn-Phong; `h` half way
-//! between `l` and `v`). The factor is 0, not `0^0`, where its base is not positive. A two-sided material has
-//! `n` turned towards the viewer: negated where `n.v < 0`.
+//! between `l` and `v`). The factor is 0, not `0^0`, where its base is not positive.
 //!
 //! A vector that is zero has no direction: a zero normal, or a point on a light, gets nothing from that light; a point at the
 //! eye, or a viewer exactly opposite a light (`h` is zero), sees no highlight.
@@ -20,8 +19,8 @@ use glam::DVec3;
 pub struct Shaded {
     /// Unclamped linear colour.
     pub rgb: [f64; 3],
-    /// The smallest `|n.l|` over all lights, and `|n.v|` if the material is two-sided; infinite when there is none of
-    /// them. The equation jumps where one is zero, so comparisons leave out points where this is below 1e-6.
+    /// The smallest `|n.l|` over all lights; infinite when there are none. The equation jumps where it is zero, so
+    /// comparisons leave out points where this is below 1e-6.
     pub smallest_cosine: f64,
 }
 
@@ -69,10 +68,7 @@ pub fn factors(
 ) -> Factors {
     let v = towards_viewer(point, eye);
     let l = towards_light(point, light);
-    let mut n = normal.normalize_or_zero();
-    if material.two_sided && n.dot(v) < 0.0 {
-        n = -n;
-    }
+    let n = normal.normalize_or_zero();
     let cosine = n.dot(l);
     if cosine <= 0.0 {
         return Factors {
@@ -109,12 +105,6 @@ pub fn shade(
         rgb: material.ambient.map(f64::from),
         smallest_cosine: f64::INFINITY,
     };
-    if material.two_sided {
-        shaded.smallest_cosine = normal
-            .normalize_or_zero()
-            .dot(towards_viewer(point, eye))
-            .abs();
-    }
     for light in lights {
         let factors = factors(point, normal, eye, material, light);
         shaded.smallest_cosine = shaded.smallest_cosine.min(factors.cosine.abs());
@@ -144,7 +134,6 @@ mod tests {
             specular: [0.0, 0.0, 0.25],
             shininess: 2.0,
             model,
-            two_sided: false,
         }
     }
 
@@ -191,15 +180,14 @@ mod tests {
     }
 
     #[test]
-    fn only_two_sided_materials_are_lit_from_behind() {
+    fn only_the_side_of_the_normal_is_lit() {
         let eye = Eye::Direction([0.0, 0.0, -1.0]);
         let lights = [light([0.0, 0.0, -1.0], false)];
         for model in [ReflectionModel::Phong, ReflectionModel::BlinnPhong] {
-            let mut material = material(model);
+            let material = material(model);
             let dark = shade(DVec3::ZERO, DVec3::Z, &eye, &material, &lights);
             assert_eq!(dark.rgb, [0.125, 0.0, 0.0]);
-            material.two_sided = true;
-            let lit = shade(DVec3::ZERO, DVec3::Z, &eye, &material, &lights);
+            let lit = shade(DVec3::ZERO, -DVec3::Z, &eye, &material, &lights);
             assert_eq!(lit.rgb, [0.125, 1.0, 1.0]);
         }
     }

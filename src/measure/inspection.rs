@@ -12,9 +12,9 @@ use serde::Serialize;
 pub struct Inspection {
     /// Objects of the scene.
     pub objects: usize,
-    /// Vertices of all objects; where normals or materials differ a position has several.
+    /// Vertices of all objects; where normals, materials or sides differ a position has several.
     pub vertices: usize,
-    /// Triangles of all objects.
+    /// Triangles of all objects; backs that are drawn count, too.
     pub triangles: TriangleCounts,
     /// Runs of neighbouring triangles that are culled as a whole.
     pub clusters: ClusterCounts,
@@ -82,9 +82,9 @@ pub struct MaterialCounts {
     pub is_specular: bool,
     /// Specular exponent.
     pub shininess: f32,
-    /// Both sides are drawn.
+    /// Backs are drawn, too.
     pub two_sided: bool,
-    /// Triangles made of it.
+    /// Triangles made of it, fronts and backs.
     pub triangles: u64,
     /// Those of them that own a pixel.
     pub visible_triangles: u64,
@@ -141,7 +141,7 @@ impl Inspection {
     pub fn new(engine: &Engine, scene: &Scene, stats: &FrameStats, size: [u32; 2]) -> Self {
         let world = engine.world();
         let view = world.view(scene.camera(), size[0], size[1]);
-        let mut leaves = LeafCounts::new(world);
+        let mut leaves = LeafCounts::new(world, scene);
         engine.for_each_leaf(|leaf| leaves.add(world, &view, leaf));
         Self {
             objects: scene.objects().len(),
@@ -217,14 +217,16 @@ struct LeafCounts {
 }
 
 impl LeafCounts {
-    fn new(world: &World) -> Self {
+    fn new(world: &World, scene: &Scene) -> Self {
+        let two_sided = |index: usize| scene.materials().get(index).is_some_and(|m| m.two_sided);
         let mut materials: Vec<MaterialCounts> = world
             .materials
             .iter()
-            .map(|material| MaterialCounts {
+            .enumerate()
+            .map(|(index, material)| MaterialCounts {
                 is_specular: material.is_specular(),
                 shininess: material.shininess,
-                two_sided: material.two_sided,
+                two_sided: two_sided(index),
                 triangles: 0,
                 visible_triangles: 0,
             })

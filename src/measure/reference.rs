@@ -22,8 +22,7 @@ use glam::DVec3;
 /// The id of pixels that nothing covers.
 pub const NO_TRIANGLE: u32 = u32::MAX;
 
-/// Where the cosine between normal and light (or, on a two-sided material, viewer) is smaller, the illumination
-/// equation may jump within a rounding error.
+/// Where the cosine between normal and light is smaller, the illumination equation may jump within a rounding error.
 pub const GRAZING_COSINE: f64 = 1e-6;
 
 /// A view shaded by Phong's method in `f64`, rows from the top.
@@ -138,15 +137,13 @@ pub(super) fn owners(world: &World, view: &View, corners: &[PixelPoint]) -> Vec<
     let mut depths = vec![f32::NEG_INFINITY; len];
     for (id, triangle) in (0u32..).zip(&world.triangles) {
         let triangle = triangle.map(|vertex| corners[vertex as usize]);
-        let material = world.triangle_material[id as usize];
-        let two_sided = world.materials[usize::from(material)].two_sided;
         let planes = TrianglePlanes::new(triangle);
         let polygon = clip(triangle);
         let snapped: Vec<[i32; 2]> = polygon.vertices().iter().map(|&p| snap(p)).collect();
         let Some(pixels) = PixelBox::of_snapped(&snapped, view.width, view.height) else {
             continue;
         };
-        let parts = front_parts(&snapped, two_sided);
+        let parts = front_parts(&snapped);
         let plane = planes.depth([pixels.x0, pixels.y0]);
         for (y, x) in
             (pixels.y0..=pixels.y1).flat_map(|y| (pixels.x0..=pixels.x1).map(move |x| (y, x)))
@@ -163,9 +160,8 @@ pub(super) fn owners(world: &World, view: &View, corners: &[PixelPoint]) -> Vec<
     ids
 }
 
-/// The edges of each part of a snapped polygon's fan, turned to the front if it is seen from behind and `two_sided`;
-/// none when it is not drawn.
-fn front_parts(polygon: &[[i32; 2]], two_sided: bool) -> Vec<[EdgeFunction; 3]> {
+/// The edges of each part of a snapped polygon's fan; none when it is seen from behind.
+fn front_parts(polygon: &[[i32; 2]]) -> Vec<[EdgeFunction; 3]> {
     let fan: Vec<[[i32; 2]; 3]> = polygon
         .get(1..)
         .unwrap_or_default()
@@ -173,11 +169,10 @@ fn front_parts(polygon: &[[i32; 2]], two_sided: bool) -> Vec<[EdgeFunction; 3]> 
         .map(|pair| [polygon[0], pair[0], pair[1]])
         .collect();
     let area: i64 = fan.iter().map(|&part| doubled_area(part)).sum();
-    if area == 0 || (area < 0 && !two_sided) {
+    if area <= 0 {
         return Vec::new();
     }
     fan.into_iter()
-        .map(|[a, b, c]| if area < 0 { [a, c, b] } else { [a, b, c] })
         .filter(|&part| doubled_area(part) > 0)
         .map(|[a, b, c]| {
             [
@@ -243,14 +238,13 @@ mod tests {
         }
     }
 
-    fn material(diffuse: [f32; 3], two_sided: bool) -> ShadingMaterial {
+    fn material(diffuse: [f32; 3]) -> ShadingMaterial {
         ShadingMaterial {
             ambient: [0.05, 0.02, 0.01],
             diffuse,
             specular: [0.4; 3],
             shininess: 20.0,
             model: ReflectionModel::Phong,
-            two_sided,
         }
     }
 
@@ -260,10 +254,7 @@ mod tests {
     /// A world of single triangles.
     fn world(triangles: &[Triangle]) -> World {
         let mut world = World {
-            materials: vec![
-                material([0.6, 0.1, 0.1], false),
-                material([0.1, 0.1, 0.6], true),
-            ],
+            materials: vec![material([0.6, 0.1, 0.1]), material([0.1, 0.1, 0.6])],
             lights: vec![ShadingLight {
                 vector: [1.0, 2.0, 1.0],
                 is_point: true,
@@ -378,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn back_faces_are_drawn_only_if_two_sided() {
+    fn triangles_seen_from_behind_are_not_drawn() {
         let mut turned = facing(-2.0, 0);
         turned.0.swap(1, 2);
         let view = view(32, 32);
@@ -386,10 +377,9 @@ mod tests {
             ReferenceImage::render(&world(&[turned]), &view, 1).covered_pixels(),
             0
         );
-        turned.2 = 1;
+        turned.0.swap(0, 1);
         let covered = ReferenceImage::render(&world(&[turned]), &view, 1).covered_pixels();
-        let front = ReferenceImage::render(&world(&[facing(-2.0, 0)]), &view, 1).covered_pixels();
-        assert_eq!(covered, front);
+        assert!(covered > 100);
     }
 
     #[test]

@@ -35,7 +35,6 @@ fn world_of(mesh: &Mesh) -> World {
             specular: [0.6; 3],
             shininess: 40.0,
             model: ReflectionModel::Phong,
-            two_sided: false,
         }],
         lights: vec![ShadingLight {
             vector: [2.0, 1.0, 3.0],

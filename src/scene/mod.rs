@@ -42,6 +42,7 @@ mod file;
 pub mod limits;
 mod mesh_file;
 mod mesh_scene;
+mod part;
 pub mod placement;
 mod read;
 mod shape;
@@ -219,7 +220,9 @@ pub struct Material {
     pub shininess: f64,
     /// Which specular term.
     pub model: ReflectionModel,
-    /// Both sides are drawn, and the normal is turned towards the viewer.
+    /// Whether backs are drawn, too. The back of a triangle is a surface of its own: seen from behind, it has its normals
+    /// turned round, whatever their angle to the viewer is. (A normal that is interpolated may turn away from the viewer
+    /// on a triangle that shows its front, which then stays the front.)
     pub two_sided: bool,
 }
 

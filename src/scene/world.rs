@@ -19,7 +19,9 @@ const FARTHEST_LIGHT: f64 = 1e6;
 
 /// All triangles, lights and materials of a scene in [world space](crate::math).
 ///
-/// Vertices and triangles of one object are consecutive. A vertex belongs to one object, hence has one material.
+/// First come the fronts of all objects, then the backs of those whose material is two-sided, as triangles of their own,
+/// whose fronts they are. Within each, vertices and triangles of one object are consecutive. A vertex belongs to one side of
+/// one object, hence has one material.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct World {
     /// Vertex positions.
@@ -28,7 +30,7 @@ pub struct World {
     pub normals: Vec3s,
     /// Material index of each vertex.
     pub vertex_material: Vec<u16>,
-    /// Vertex indices, counter-clockwise seen from outside.
+    /// Vertex indices, counter-clockwise seen from where the triangle is drawn.
     pub triangles: Vec<[u32; 3]>,
     /// Material index of each triangle.
     pub triangle_material: Vec<u16>,
@@ -74,8 +76,6 @@ pub struct ShadingMaterial {
     pub shininess: f32,
     /// Which specular term.
     pub model: ReflectionModel,
-    /// Both sides are drawn, and the normal is turned towards the viewer.
-    pub two_sided: bool,
 }
 
 impl ShadingMaterial {
@@ -94,7 +94,6 @@ impl ShadingMaterial {
             specular: material.specular.map(|c| c as f32),
             shininess: material.shininess as f32,
             model: material.model,
-            two_sided: material.two_sided,
         }
     }
 }

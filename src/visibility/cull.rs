@@ -9,7 +9,7 @@
 //! over the ball, and over the boxes of a bounding volume hierarchy about the balls, include all rounding: see the
 //! module `halfspace`.
 //!
-//! **Facing away**: see the module `facing`. Never applied to two-sided materials.
+//! **Facing away**: see the module `facing`. Backs that are drawn have clusters of their own.
 //!
 //! A subtree that lies inside of one of the six half-spaces is not tested against it any more. Results do not depend
 //! on threads or SIMD: this is scalar `f64` arithmetic.
@@ -53,8 +53,6 @@ pub struct CullCounts {
 pub struct Culler {
     /// Ascending by triangles.
     clusters: Vec<Cluster>,
-    /// For each cluster, whether both sides of its triangles are drawn.
-    two_sided: Vec<bool>,
     /// The hierarchy, its root first; a leaf holds one cluster, by its index in `clusters`.
     hierarchy: Bvh2,
     /// Clusters that are not in the hierarchy.
@@ -74,23 +72,11 @@ impl fmt::Debug for Culler {
 }
 
 impl Culler {
-    /// Prepares culling of `clusters`, whose triangle ranges must be disjoint; `two_sided` says for each of them
-    /// whether both sides of its triangles are drawn.
-    ///
-    /// # Panics
-    /// When the slices' lengths differ.
+    /// Prepares culling of `clusters`, whose triangle ranges must be disjoint.
     #[must_use]
-    pub fn new(clusters: &[Cluster], two_sided: &[bool]) -> Self {
-        assert_eq!(
-            clusters.len(),
-            two_sided.len(),
-            "one flag for each of the clusters"
-        );
-        let mut order: Vec<usize> = (0..clusters.len()).collect();
-        order.sort_by_key(|&i| clusters[i].triangles.start);
-        let clusters: Vec<Cluster> = order.iter().map(|&i| clusters[i].clone()).collect();
-        let two_sided = order.iter().map(|&i| two_sided[i]).collect();
-
+    pub fn new(clusters: &[Cluster]) -> Self {
+        let mut clusters = clusters.to_vec();
+        clusters.sort_by_key(|cluster| cluster.triangles.start);
         let (mut boxes, mut bounded, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
         for (index, cluster) in (0_u32..).zip(&clusters) {
             if let Some(aabb) = bounding_box(cluster) {
@@ -113,7 +99,6 @@ impl Culler {
             stack: Vec::with_capacity(hierarchy.max_depth + 2),
             hierarchy,
             clusters,
-            two_sided,
             unbounded,
         }
     }
@@ -136,7 +121,7 @@ impl Culler {
             .map(|(index, _)| index)
             .eq(self.unbounded.iter().copied())
         {
-            *self = Self::new(clusters, &self.two_sided);
+            *self = Self::new(clusters);
             return;
         }
         for node in &mut self.hierarchy.nodes {
@@ -185,7 +170,7 @@ impl Culler {
                 continue;
             }
             inside += 1;
-            if !self.two_sided[index] && facing.is_away(cluster) {
+            if facing.is_away(cluster) {
                 counts.facing_away += 1;
             } else {
                 self.kept[index] = true;

@@ -37,18 +37,17 @@ impl Random {
     }
 }
 
-pub(crate) fn material(two_sided: bool) -> ShadingMaterial {
+pub(crate) fn material() -> ShadingMaterial {
     ShadingMaterial {
         ambient: [0.05, 0.04, 0.06],
         diffuse: [0.7, 0.5, 0.3],
         specular: [0.6; 3],
         shininess: 40.0,
         model: ReflectionModel::Phong,
-        two_sided,
     }
 }
 
-/// A world without triangles: material 0 is one-sided, material 1 two-sided; four lights.
+/// A world without triangles, with one material and four lights.
 pub(crate) fn empty_world() -> World {
     let light = |vector, is_point| ShadingLight {
         vector,
@@ -56,7 +55,7 @@ pub(crate) fn empty_world() -> World {
         radiance: [0.5, 0.45, 0.4],
     };
     World {
-        materials: vec![material(false), material(true)],
+        materials: vec![material()],
         lights: vec![
             light([3.0, 4.0, -5.0], true),
             light([-6.0, 1.0, 0.5], true),
@@ -69,20 +68,22 @@ pub(crate) fn empty_world() -> World {
 }
 
 /// Adds a triangle with vertices of its own.
-pub(crate) fn add_triangle(
-    world: &mut World,
-    corners: [[f32; 3]; 3],
-    normals: [[f32; 3]; 3],
-    material: u16,
-) {
+pub(crate) fn add_triangle(world: &mut World, corners: [[f32; 3]; 3], normals: [[f32; 3]; 3]) {
     let first = world.positions.len() as u32;
     for (p, n) in corners.into_iter().zip(normals) {
         world.positions.push(p);
         world.normals.push(n);
-        world.vertex_material.push(material);
+        world.vertex_material.push(0);
     }
     world.triangles.push([first, first + 1, first + 2]);
-    world.triangle_material.push(material);
+    world.triangle_material.push(0);
+}
+
+/// Adds a triangle and the same turned round, so that it can be seen whichever way it turns.
+pub(crate) fn add_both_sides(world: &mut World, corners: [[f32; 3]; 3], normals: [[f32; 3]; 3]) {
+    let ([a, b, c], [l, m, n]) = (corners, normals);
+    add_triangle(world, [a, b, c], [l, m, n]);
+    add_triangle(world, [a, c, b], [l, n, m].map(|n| n.map(|v| -v)));
 }
 
 /// Eye at the origin, looking along +z, y down; the image plane at distance 1 is `zoom` pixels per unit.
@@ -188,8 +189,7 @@ pub(crate) fn reference(
             .map(|i| [polygon[0], polygon[i - 1], polygon[i]])
             .collect();
         let area: i64 = fan.iter().map(|&t| doubled_area(t)).sum();
-        let material = world.triangle_material[id as usize];
-        if area < 0 && !world.materials[usize::from(material)].two_sided {
+        if area < 0 {
             continue;
         }
         let Some(bounds) = PixelBox::of_snapped(&polygon, view.width, view.height) else {
@@ -197,7 +197,6 @@ pub(crate) fn reference(
         };
         let plane = TrianglePlanes::new(corners).depth([bounds.x0, bounds.y0]);
         for [a, b, c] in fan {
-            let [a, b, c] = if area < 0 { [a, c, b] } else { [a, b, c] };
             if doubled_area([a, b, c]) <= 0 {
                 continue;
             }
@@ -252,7 +251,7 @@ pub(crate) fn geometry<'a>(
 }
 
 /// A random triangle soup around the view volume: ordinary triangles, slivers, tiny and huge ones, some behind the eye or through
-/// the near plane and the guard band, of both windings, one- and two-sided.
+/// the near plane and the guard band, of both windings, some of them with their backs.
 pub(crate) fn soup(random: &mut Random, count: usize) -> World {
     soup_of_sizes(random, count, &[0.02, 0.3, 1.0, 30.0, 3000.0])
 }
@@ -260,7 +259,7 @@ pub(crate) fn soup(random: &mut Random, count: usize) -> World {
 /// The same with chosen sizes.
 pub(crate) fn soup_of_sizes(random: &mut Random, count: usize, sizes: &[f32]) -> World {
     let mut world = empty_world();
-    for _ in 0..count {
+    while world.triangles.len() < count {
         let size = sizes[random.below(sizes.len())];
         let center = [
             random.range(-4.0, 4.0),
@@ -281,7 +280,11 @@ pub(crate) fn soup_of_sizes(random: &mut Random, count: usize, sizes: &[f32]) ->
             _ => {}
         }
         let normals = [[0.0, 0.0, -1.0]; 3];
-        add_triangle(&mut world, corners, normals, random.below(2) as u16);
+        if random.below(2) == 0 || world.triangles.len() + 2 > count {
+            add_triangle(&mut world, corners, normals);
+        } else {
+            add_both_sides(&mut world, corners, normals);
+        }
     }
     world
 }

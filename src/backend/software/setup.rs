@@ -1,7 +1,7 @@
 //! Triangle set-up: culling, clipping, and what the tiles need to draw a triangle; then binning.
 //!
 //! A triangle is dropped when all its corners are outside of one clipping plane, when its snapped area says that it faces
-//! away (it is turned around if its material is two-sided), or when no pixel centre lies in its box. A triangle with
+//! away, or when no pixel centre lies in its box. A triangle with
 //! a corner outside of some plane is clipped and becomes a fan of triangles with the same id. The fan faces the way its whole
 //! snapped area says; single pieces that rounding turned the other way are left out. Depth comes from
 //! the unclipped triangle, anchored at the top left pixel of the box of everything that is left of it, so that all pieces agree.
@@ -121,8 +121,7 @@ fn set_up_triangle(
         return;
     };
     let area = outline.doubled_area();
-    let turned = area < 0;
-    if turned && !world.materials[usize::from(world.triangle_material[id])].two_sided {
+    if area < 0 {
         share.counts.back_facing += 1;
         return;
     }
@@ -136,8 +135,7 @@ fn set_up_triangle(
     share.counts.clipped += u64::from(outline.clipped);
     share.counts.drawn += 1;
     let depth = TrianglePlanes::new(corners(vertices, triangle)).depth([pixels.x0, pixels.y0]);
-    for [a, b, c] in outline.fan() {
-        let corners = if turned { [a, c, b] } else { [a, b, c] };
+    for corners in outline.fan() {
         let bounds = PixelBox::of_snapped(&corners, grid.width, grid.height);
         if let Some(bounds) = bounds.filter(|_| doubled_area(corners) > 0) {
             share.prepared.push(Prepared {
