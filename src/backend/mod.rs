@@ -165,13 +165,13 @@ pub enum Fill {
 /// [`pending_pixels`](Self::pending_pixels) may be asked at any time.
 ///
 /// **What may be assumed.** Indices are in range, `visible` is ascending and disjoint, and the view's sides are at most
-/// [`MAX_IMAGE_SIDE`](crate::geometry::screen::MAX_IMAGE_SIDE). The world's triangles, positions and sidedness do not
-/// change during an image; lights, materials, normals and background may, from one `resolve` to the next. Nothing
+/// [`MAX_IMAGE_SIDE`](crate::geometry::screen::MAX_IMAGE_SIDE). The world's triangles and positions do not change
+/// during an image; lights, materials, normals and background may, from one `resolve` to the next. Nothing
 /// else is promised: coordinates may be anywhere, behind the eye, huge, or no numbers at all; colours may be
 /// negative, above 1 or NaN (which counts as black); triangles may have no area; an image may have no pixels.
 ///
-/// **Which triangles, which pixels.** A triangle that turns its back to the viewer is not drawn unless its material is
-/// two-sided. What lies outside of the near and far planes is not drawn. A pixel is covered when its centre lies inside
+/// **Which triangles, which pixels.** A triangle that turns its back to the viewer is not drawn; a surface with two
+/// sides has triangles for both. What lies outside of the near and far planes is not drawn. A pixel is covered when its centre lies inside
 /// the projected triangle; within a fraction of a pixel of an edge a backend without ids may decide otherwise, but
 /// triangles that share an edge leave no pixel out between them. A backend *with ids* decides exactly as
 /// [`geometry::screen`](crate::geometry::screen) does, and there the nearest triangle owns the pixel; without ids,
@@ -202,7 +202,7 @@ pub trait Backend: Debug + Send {
     fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts;
 
     /// The triangles whose vertices have to be illuminated, ascending. With ids: those that own a pixel. Without:
-    /// those that face the viewer (or are two-sided) and may touch the centre of a pixel, whether something hides
+    /// those that face the viewer and may touch the centre of a pixel, whether something hides
     /// them or not.
     fn visible_triangles(&self) -> &[u32];
 

@@ -72,10 +72,8 @@ pub(super) enum Fate {
 
 /// Decides whether a triangle is drawn.
 pub(super) fn fate(geometry: Geometry<'_>, triangle: u32) -> Fate {
-    let world = geometry.world;
     let corners = corners(geometry, triangle);
-    let material = usize::from(world.triangle_material[triangle as usize]);
-    if TrianglePlanes::new(corners).facing() < 0.0 && !world.materials[material].two_sided {
+    if TrianglePlanes::new(corners).facing() < 0.0 {
         return Fate::FacesAway;
     }
     let (polygon, clipped) = match Outline::new(corners) {

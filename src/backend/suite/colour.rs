@@ -23,14 +23,11 @@ pub(super) fn the_background_is_where_nothing_is(fixture: &Fixture<'_>) {
 
 pub(super) fn flat_triangles_have_their_colour(fixture: &Fixture<'_>) {
     let mut picture = Picture::flat(40, 30);
-    picture.add(
-        [
-            [-90.0, -90.0, 0.5],
-            [-90.0, 200.0, 0.5],
-            [200.0, -90.0, 0.5],
-        ],
-        1,
-    );
+    picture.add_facing([
+        [-90.0, -90.0, 0.5],
+        [-90.0, 200.0, 0.5],
+        [200.0, -90.0, 0.5],
+    ]);
     for colour in [[0.0; 3], [1.0; 3], [0.5, 0.02, 0.9]] {
         let mut colours = Vec3s::default();
         colours.push(colour);
@@ -75,7 +72,7 @@ pub(super) fn gouraud_is_interpolated_as_declared(fixture: &Fixture<'_>) {
                 [z * random.range(-0.8, 0.8), z * random.range(-0.6, 0.6), z]
             }
         };
-        picture.add([corner(), corner(), corner()], 1);
+        picture.add_facing([corner(), corner(), corner()]);
         let mut colours = random.colours(3);
         if round % 3 == 0 {
             // Some channels do not vary, some vary a little.
@@ -102,14 +99,11 @@ pub(super) fn gouraud_is_interpolated_as_declared(fixture: &Fixture<'_>) {
 
 pub(super) fn colours_out_of_range_are_clamped(fixture: &Fixture<'_>) {
     let mut picture = Picture::flat(20, 20);
-    picture.add(
-        [
-            [-90.0, -90.0, 0.5],
-            [-90.0, 200.0, 0.5],
-            [200.0, -90.0, 0.5],
-        ],
-        1,
-    );
+    picture.add_facing([
+        [-90.0, -90.0, 0.5],
+        [-90.0, 200.0, 0.5],
+        [200.0, -90.0, 0.5],
+    ]);
     let cases = [
         (f32::NAN, 0.0),
         (f32::NEG_INFINITY, 0.0),
@@ -146,7 +140,7 @@ pub(super) fn phong_is_the_illumination_equation(fixture: &Fixture<'_>) {
             let z = random.range(1.0, 6.0);
             [z * random.range(-0.8, 0.8), z * random.range(-0.6, 0.6), z]
         };
-        picture.add([corner(), corner(), corner()], 1);
+        picture.add_facing([corner(), corner(), corner()]);
         for k in 0..3 {
             let [x, y] = [random.range(-0.5, 0.5), random.range(-0.5, 0.5)];
             picture.world.normals.set(k, [x, y, -1.0]);

@@ -24,7 +24,11 @@ fn layers(random: &mut Random, width: u32, height: u32, count: usize) -> Picture
             .fold(1.0, f32::max);
         // Thinner ones have no inside to compare.
         if area > 6.0 * longest {
-            picture.add(corners, random.below(2) as u16);
+            if random.below(2) == 0 {
+                picture.add(corners);
+            } else {
+                picture.add_facing(corners);
+            }
         }
     }
     picture
@@ -65,7 +69,7 @@ pub(super) fn triangles_that_share_edges_leave_no_gap(fixture: &Fixture<'_>) {
                     (i as f32 + shift) * step[axis] - 8.0
                 };
                 let (x, y) = (at(column, 0), at(row, 1));
-                picture.add_vertex([x, y, 0.5], 1);
+                picture.add_vertex([x, y, 0.5]);
             }
         }
         let vertex = |row: i32, column: i32| (row * (columns + 1) + column) as u32;
@@ -73,8 +77,10 @@ pub(super) fn triangles_that_share_edges_leave_no_gap(fixture: &Fixture<'_>) {
             for column in 0..columns {
                 let [a, b] = [vertex(row, column), vertex(row, column + 1)];
                 let [c, d] = [vertex(row + 1, column), vertex(row + 1, column + 1)];
-                picture.add_indexed([a, b, c], 1);
-                picture.add_indexed([b, d, c], 1);
+                picture.add_indexed([a, b, c]);
+                picture.face_viewer();
+                picture.add_indexed([b, d, c]);
+                picture.face_viewer();
             }
         }
         let colours = {

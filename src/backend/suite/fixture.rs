@@ -66,7 +66,7 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// An empty world in which coordinates are pixels and reversed depth. Material 0 is one-sided, material 1 two-sided.
+    /// An empty world in which coordinates are pixels and reversed depth.
     pub(super) fn flat(width: u32, height: u32) -> Self {
         let view = View {
             width,
@@ -97,13 +97,12 @@ impl Picture {
     }
 
     fn new(view: View) -> Self {
-        let material = |two_sided| ShadingMaterial {
+        let material = ShadingMaterial {
             ambient: [0.05, 0.04, 0.06],
             diffuse: [0.7, 0.5, 0.3],
             specular: [0.6; 3],
             shininess: 40.0,
             model: ReflectionModel::Phong,
-            two_sided,
         };
         let light = |vector, is_point| ShadingLight {
             vector,
@@ -112,7 +111,7 @@ impl Picture {
         };
         Self {
             world: World {
-                materials: vec![material(false), material(true)],
+                materials: vec![material],
                 lights: vec![
                     light([30.0, 40.0, -50.0], true),
                     light([0.6, 0.0, -0.8], false),
@@ -126,23 +125,40 @@ impl Picture {
     }
 
     /// Adds a triangle with vertices of its own, normals towards the viewer.
-    pub(super) fn add(&mut self, corners: [[f32; 3]; 3], material: u16) {
+    pub(super) fn add(&mut self, corners: [[f32; 3]; 3]) {
         let first = self.world.positions.len() as u32;
         for corner in corners {
-            self.add_vertex(corner, material);
+            self.add_vertex(corner);
         }
-        self.add_indexed([first, first + 1, first + 2], material);
+        self.add_indexed([first, first + 1, first + 2]);
     }
 
-    pub(super) fn add_vertex(&mut self, position: [f32; 3], material: u16) {
+    /// The same, turned round if the viewer would see its back.
+    pub(super) fn add_facing(&mut self, corners: [[f32; 3]; 3]) {
+        self.add(corners);
+        self.face_viewer();
+    }
+
+    pub(super) fn add_vertex(&mut self, position: [f32; 3]) {
         self.world.positions.push(position);
         self.world.normals.push([0.1, 0.0, -1.0]);
-        self.world.vertex_material.push(material);
+        self.world.vertex_material.push(0);
     }
 
-    pub(super) fn add_indexed(&mut self, corners: [u32; 3], material: u16) {
+    /// Turns the last triangle round if the viewer sees its back.
+    pub(super) fn face_viewer(&mut self) {
+        if let Some([a, b, c]) = self.world.triangles.pop() {
+            let corners =
+                [a, b, c].map(|v| self.view.project(self.world.positions.get(v as usize)));
+            let turned = TrianglePlanes::new(corners).facing() < 0.0;
+            let triangle = if turned { [a, c, b] } else { [a, b, c] };
+            self.world.triangles.push(triangle);
+        }
+    }
+
+    pub(super) fn add_indexed(&mut self, corners: [u32; 3]) {
         self.world.triangles.push(corners);
-        self.world.triangle_material.push(material);
+        self.world.triangle_material.push(0);
         self.visible = std::iter::once(0..self.world.triangles.len() as u32).collect();
     }
 
@@ -197,16 +213,14 @@ impl Picture {
             .map(|i| [polygon[0], polygon[i - 1], polygon[i]])
             .collect();
         let turned = fan.iter().map(|&t| doubled_area(t)).sum::<i64>() < 0;
-        let material = usize::from(self.world.triangle_material[id as usize]);
         let Some(bounds) = PixelBox::of_snapped(&polygon, width, height) else {
             return;
         };
-        if turned && !self.world.materials[material].two_sided {
+        if turned {
             return;
         }
         let depth = TrianglePlanes::new(corners).depth([bounds.x0, bounds.y0]);
         for [a, b, c] in fan {
-            let [a, b, c] = if turned { [a, c, b] } else { [a, b, c] };
             let edges = [(a, b), (b, c), (c, a)].map(|(p, q)| EdgeFunction::new(p, q));
             for y in bounds.y0..=bounds.y1 {
                 for x in bounds.x0..=bounds.x1 {

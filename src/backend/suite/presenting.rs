@@ -10,7 +10,7 @@ const PIXELS: u64 = 301 * 83;
 
 fn picture() -> (Picture, Vec3s) {
     let mut picture = Picture::flat(SIZE.0, SIZE.1);
-    picture.add([[20.0, 3.0, 0.5], [31.0, 80.0, 0.5], [290.0, 40.0, 0.5]], 1);
+    picture.add_facing([[20.0, 3.0, 0.5], [31.0, 80.0, 0.5], [290.0, 40.0, 0.5]]);
     (picture, Random(31).colours(3))
 }
 

@@ -9,8 +9,8 @@ use crate::output::Frame;
 /// A large triangle partly behind a smaller one.
 fn overlapping() -> Picture {
     let mut picture = Picture::flat(150, 110);
-    picture.add([[5.0, 4.0, 0.4], [20.0, 105.0, 0.4], [140.0, 60.0, 0.4]], 1);
-    picture.add([[30.0, 30.0, 0.8], [40.0, 70.0, 0.8], [80.0, 50.0, 0.8]], 1);
+    picture.add_facing([[5.0, 4.0, 0.4], [20.0, 105.0, 0.4], [140.0, 60.0, 0.4]]);
+    picture.add_facing([[30.0, 30.0, 0.8], [40.0, 70.0, 0.8], [80.0, 50.0, 0.8]]);
     picture
 }
 
@@ -115,10 +115,10 @@ pub(super) fn parts_take_the_place_of_their_triangle(fixture: &Fixture<'_>) {
     let mut split = Picture::flat(150, 110);
     let mut split_colours = Vec3s::default();
     for part in &parts {
-        split.add(part.corners, 1);
+        split.add_facing(part.corners);
         split_colours.push(part.colours[0]);
     }
-    split.add([3, 4, 5].map(|v| picture.world.positions.get(v)), 1);
+    split.add_facing([3, 4, 5].map(|v| picture.world.positions.get(v)));
     split_colours.push([0.0; 3]);
     let mut compared = 0;
     for (at, pixel, id) in split.owners().pixels(false) {

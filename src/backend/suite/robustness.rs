@@ -24,7 +24,11 @@ fn soup(random: &mut Random, width: u32, height: u32, count: usize) -> Picture {
             1 => corners[2] = corners[1],
             _ => {}
         }
-        picture.add(corners, random.below(2) as u16);
+        if random.below(2) == 0 {
+            picture.add(corners);
+        } else {
+            picture.add_facing(corners);
+        }
     }
     picture
 }
@@ -89,15 +93,12 @@ pub(super) fn nothing_to_draw_is_drawn(fixture: &Fixture<'_>) {
     // Behind the eye, beyond the far plane, before the near plane, beside the image.
     for (x, z) in [(0.0, -5.0), (0.0, 200.0), (0.0, 0.2), (900.0, 5.0)] {
         let mut picture = Picture::perspective(60, 40);
-        picture.add(
-            [[x - 1.0, -1.0, z], [x - 1.0, 1.0, z], [x + 1.0, 0.0, z]],
-            1,
-        );
+        picture.add_facing([[x - 1.0, -1.0, z], [x - 1.0, 1.0, z], [x + 1.0, 0.0, z]]);
         pictures.push(picture);
     }
     // Its back, one-sided. Counter-clockwise on the screen is front; this turns clockwise.
     let mut picture = Picture::flat(60, 40);
-    picture.add([[5.0, 5.0, 0.5], [50.0, 5.0, 0.5], [5.0, 35.0, 0.5]], 0);
+    picture.add([[5.0, 5.0, 0.5], [50.0, 5.0, 0.5], [5.0, 35.0, 0.5]]);
     pictures.push(picture);
     for picture in pictures {
         let colours = Random(53).colours(3);
@@ -151,7 +152,11 @@ pub(super) fn odd_numbers_do_no_harm(fixture: &Fixture<'_>) {
                 }
             };
             let corners = [[(); 3]; 3].map(|corner| corner.map(|()| number()));
-            picture.add(corners, random.below(2) as u16);
+            if random.below(2) == 0 {
+                picture.add(corners);
+            } else {
+                picture.add_facing(corners);
+            }
         }
         let mut colours = Vec3s::default();
         for _ in 0..picture.world.positions.len() {
@@ -163,10 +168,7 @@ pub(super) fn odd_numbers_do_no_harm(fixture: &Fixture<'_>) {
             "pixels are opaque"
         );
         // An ordinary triangle in front of it all is drawn as ever.
-        picture.add(
-            [[-9.0, -9.0, 1.0], [-9.0, 300.0, 1.0], [300.0, -9.0, 1.0]],
-            1,
-        );
+        picture.add_facing([[-9.0, -9.0, 1.0], [-9.0, 300.0, 1.0], [300.0, -9.0, 1.0]]);
         if round % 2 == 0 {
             let mut flat = Vec3s::default();
             flat.resize(picture.triangles() as usize);
