@@ -161,7 +161,7 @@ pub(super) fn phong_is_the_illumination_equation(fixture: &Fixture<'_>) {
                 at_pixel(&world.positions),
                 at_pixel(&world.normals),
                 &picture.view.eye,
-                &world.materials[1],
+                &world.materials[0],
                 &world.lights,
             );
             // Where light grazes, a rounding decides whether there is a highlight.

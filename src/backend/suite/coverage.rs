@@ -77,10 +77,8 @@ pub(super) fn triangles_that_share_edges_leave_no_gap(fixture: &Fixture<'_>) {
             for column in 0..columns {
                 let [a, b] = [vertex(row, column), vertex(row, column + 1)];
                 let [c, d] = [vertex(row + 1, column), vertex(row + 1, column + 1)];
-                picture.add_indexed([a, b, c]);
-                picture.face_viewer();
-                picture.add_indexed([b, d, c]);
-                picture.face_viewer();
+                picture.add_indexed_facing([a, b, c]);
+                picture.add_indexed_facing([b, d, c]);
             }
         }
         let colours = {

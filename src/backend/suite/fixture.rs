@@ -134,9 +134,12 @@ impl Picture {
     }
 
     /// The same, turned round if the viewer would see its back.
-    pub(super) fn add_facing(&mut self, corners: [[f32; 3]; 3]) {
-        self.add(corners);
-        self.face_viewer();
+    pub(super) fn add_facing(&mut self, [a, b, c]: [[f32; 3]; 3]) {
+        if self.shows_back([a, b, c]) {
+            self.add([a, c, b]);
+        } else {
+            self.add([a, b, c]);
+        }
     }
 
     pub(super) fn add_vertex(&mut self, position: [f32; 3]) {
@@ -145,18 +148,21 @@ impl Picture {
         self.world.vertex_material.push(0);
     }
 
-    /// Turns the last triangle round if the viewer sees its back.
-    pub(super) fn face_viewer(&mut self) {
-        if let Some([a, b, c]) = self.world.triangles.pop() {
-            let corners =
-                [a, b, c].map(|v| self.view.project(self.world.positions.get(v as usize)));
-            let turned = TrianglePlanes::new(corners).facing() < 0.0;
-            let triangle = if turned { [a, c, b] } else { [a, b, c] };
-            self.world.triangles.push(triangle);
+    /// Adds a triangle of vertices that are there, turned round if the viewer would see its back.
+    pub(super) fn add_indexed_facing(&mut self, [a, b, c]: [u32; 3]) {
+        let corners = [a, b, c].map(|v| self.world.positions.get(v as usize));
+        if self.shows_back(corners) {
+            self.add_indexed([a, c, b]);
+        } else {
+            self.add_indexed([a, b, c]);
         }
     }
 
-    pub(super) fn add_indexed(&mut self, corners: [u32; 3]) {
+    fn shows_back(&self, corners: [[f32; 3]; 3]) -> bool {
+        TrianglePlanes::new(corners.map(|p| self.view.project(p))).facing() < 0.0
+    }
+
+    fn add_indexed(&mut self, corners: [u32; 3]) {
         self.world.triangles.push(corners);
         self.world.triangle_material.push(0);
         self.visible = std::iter::once(0..self.world.triangles.len() as u32).collect();
