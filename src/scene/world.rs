@@ -19,8 +19,8 @@ const FARTHEST_LIGHT: f64 = 1e6;
 
 /// All triangles, lights and materials of a scene in [world space](crate::math).
 ///
-/// First come the fronts of all objects, then the backs of those whose material is two-sided, as triangles of their own,
-/// whose fronts they are. Within each, vertices and triangles of one object are consecutive. A vertex belongs to one side of
+/// First come the fronts of all objects, then the backs of those whose material is two-sided: triangles like any other,
+/// with the opposite winding. Within each, vertices and triangles of one object are consecutive. A vertex belongs to one side of
 /// one object, hence has one material.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct World {
