@@ -144,7 +144,10 @@ pub(super) fn owners(world: &World, view: &View, corners: &[PixelPoint]) -> Vec<
             continue;
         };
         let parts = front_parts(&snapped);
-        let plane = planes.depth([pixels.x0, pixels.y0]);
+        let mut plane = planes.depth([pixels.x0, pixels.y0]);
+        if world.backs.contains(&id) {
+            plane = plane.moved_back();
+        }
         for (y, x) in
             (pixels.y0..=pixels.y1).flat_map(|y| (pixels.x0..=pixels.x1).map(move |x| (y, x)))
         {

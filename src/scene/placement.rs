@@ -14,8 +14,7 @@
 //! left its place is welded to nothing but itself. A front is never welded to a back.
 //!
 //! The world holds the fronts of all objects and then the backs of those whose material is two-sided. So a front has the
-//! same number whether there are backs or not, and where both are equally near, on the outline of a closed mesh, it has
-//! the pixel, since ties go to the lower number.
+//! same number whether there are backs or not.
 
 use super::part::{Part, mirrors};
 use super::{Extent, Material, Object, Revisions, Scene, World, defaults};
@@ -93,11 +92,13 @@ impl Placement {
         for (object, &rest) in scene.objects.iter().zip(&scene.rest) {
             parts.push(Part::append(&mut world, object, rest));
         }
+        let fronts = world.triangles.len() as u32;
         for (part, object) in parts.iter_mut().zip(&scene.objects) {
             if material(scene, object).1.two_sided {
                 part.append_back(&mut world);
             }
         }
+        world.backs = fronts..world.triangles.len() as u32;
         let reach = parts
             .iter()
             .map(|part| part.reach(&part.rest, at_rest.origin));

@@ -13,6 +13,7 @@ use crate::geometry::Vec3s;
 use crate::geometry::clusters::Cluster;
 use crate::geometry::topology::Topology;
 use glam::DVec3;
+use std::ops::Range;
 
 /// A point light farther away than this many scene radii shines like a directional one.
 const FARTHEST_LIGHT: f64 = 1e6;
@@ -32,6 +33,8 @@ pub struct World {
     pub vertex_material: Vec<u16>,
     /// Vertex indices, counter-clockwise seen from where the triangle is drawn.
     pub triangles: Vec<[u32; 3]>,
+    /// Those of the triangles that are backs; the last ones.
+    pub backs: Range<u32>,
     /// Material index of each triangle.
     pub triangle_material: Vec<u16>,
     /// Runs of neighbouring triangles, in order; together they are all triangles.

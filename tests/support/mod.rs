@@ -195,7 +195,10 @@ pub(crate) fn reference(
         let Some(bounds) = PixelBox::of_snapped(&polygon, view.width, view.height) else {
             continue;
         };
-        let plane = TrianglePlanes::new(corners).depth([bounds.x0, bounds.y0]);
+        let mut plane = TrianglePlanes::new(corners).depth([bounds.x0, bounds.y0]);
+        if world.backs.contains(&id) {
+            plane = plane.moved_back();
+        }
         for [a, b, c] in fan {
             if doubled_area([a, b, c]) <= 0 {
                 continue;
@@ -251,7 +254,8 @@ pub(crate) fn geometry<'a>(
 }
 
 /// A random triangle soup around the view volume: ordinary triangles, slivers, tiny and huge ones, some behind the eye or through
-/// the near plane and the guard band, of both windings, some of them with their backs.
+/// the near plane and the guard band, of both windings, some of them turned both ways. The last third count as
+/// backs.
 pub(crate) fn soup(random: &mut Random, count: usize) -> World {
     soup_of_sizes(random, count, &[0.02, 0.3, 1.0, 30.0, 3000.0])
 }
@@ -286,5 +290,6 @@ pub(crate) fn soup_of_sizes(random: &mut Random, count: usize, sizes: &[f32]) ->
             add_both_sides(&mut world, corners, normals);
         }
     }
+    world.backs = count as u32 * 2 / 3..count as u32;
     world
 }

@@ -1,10 +1,10 @@
 //! Triangle set-up: culling, clipping, and what the tiles need to draw a triangle; then binning.
 //!
 //! A triangle is dropped when all its corners are outside of one clipping plane, when its snapped area says that it faces
-//! away, or when no pixel centre lies in its box. A triangle with
-//! a corner outside of some plane is clipped and becomes a fan of triangles with the same id. The fan faces the way its whole
-//! snapped area says; single pieces that rounding turned the other way are left out. Depth comes from
-//! the unclipped triangle, anchored at the top left pixel of the box of everything that is left of it, so that all pieces agree.
+//! away, or when no pixel centre lies in its box. A triangle with a corner outside of some plane is clipped and becomes a
+//! fan of triangles with the same id. The fan faces the way its whole snapped area says; single pieces that rounding
+//! turned the other way are left out. Depth comes from the unclipped triangle, anchored at the top left pixel of the box of
+//! everything that is left of it, so that all pieces agree.
 //!
 //! Bins are made for each share of triangles by itself (a counting sort by tile), and a tile looks into every share's bin in
 //! turn: nothing is merged, and each bin lists its triangles in ascending order.
@@ -134,7 +134,10 @@ fn set_up_triangle(
     };
     share.counts.clipped += u64::from(outline.clipped);
     share.counts.drawn += 1;
-    let depth = TrianglePlanes::new(corners(vertices, triangle)).depth([pixels.x0, pixels.y0]);
+    let mut depth = TrianglePlanes::new(corners(vertices, triangle)).depth([pixels.x0, pixels.y0]);
+    if world.backs.contains(&(id as u32)) {
+        depth = depth.moved_back();
+    }
     for corners in outline.fan() {
         let bounds = PixelBox::of_snapped(&corners, grid.width, grid.height);
         if let Some(bounds) = bounds.filter(|_| doubled_area(corners) > 0) {

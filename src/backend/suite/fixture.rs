@@ -225,7 +225,10 @@ impl Picture {
         if turned {
             return;
         }
-        let depth = TrianglePlanes::new(corners).depth([bounds.x0, bounds.y0]);
+        let mut depth = TrianglePlanes::new(corners).depth([bounds.x0, bounds.y0]);
+        if self.world.backs.contains(&id) {
+            depth = depth.moved_back();
+        }
         for [a, b, c] in fan {
             let edges = [(a, b), (b, c), (c, a)].map(|(p, q)| EdgeFunction::new(p, q));
             for y in bounds.y0..=bounds.y1 {
