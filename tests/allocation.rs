@@ -8,7 +8,7 @@
 
 use glam::{DMat4, DVec3};
 use rayon::ThreadPool;
-use specula::scene::{Camera, Light};
+use specula::scene::{Camera, Light, Material};
 use specula::{Budget, Engine, EngineOptions, Frame, FrameStats, Method, Scene};
 use std::fmt;
 use std::path::Path;
@@ -238,7 +238,7 @@ fn turned(camera: &Camera, turns: f64) -> Camera {
     }
 }
 
-/// Scenes that load the stages in different ways; the last has a quarter of the triangles of `heavy`.
+/// Scenes that load the stages in different ways; `heavy` with a quarter of its triangles, and `minimal` with backs as well.
 fn scenes() -> impl Iterator<Item = (&'static str, Scene)> {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let read = move |name: &str| {
@@ -248,9 +248,16 @@ fn scenes() -> impl Iterator<Item = (&'static str, Scene)> {
             .replace("tessellation: 32", "tessellation: 16");
         Scene::parse(&text, name).expect(name)
     };
+    let mut with_backs = read("minimal");
+    let material = Material {
+        two_sided: true,
+        ..with_backs.materials()[0]
+    };
+    with_backs.set_material(0, material);
     ["teapot", "walls", "lights16", "minimal", "closeup", "heavy"]
         .into_iter()
         .map(move |name| (name, read(name)))
+        .chain(std::iter::once(("minimal with backs", with_backs)))
 }
 
 #[test]

@@ -5,6 +5,9 @@
 //! the owning triangle's unsnapped barycentrics, clamped to the triangle, and the illumination equation is evaluated,
 //! all in `f64`; the result is clamped to `[0, 1]` and encoded.
 //!
+//! Triangles seen from behind are not drawn: what a two-sided material shows there are triangles of the world as well, with
+//! normals of their own.
+//!
 //! A triangle that had to be clipped is drawn as a fan about the clipped polygon's first vertex. The fan faces the way
 //! that its whole snapped area says (parts that rounding turned the other way are left out), and has the depth plane of
 //! the whole triangle, anchored at the top left pixel of the box of everything that is left of it.
