@@ -13,6 +13,15 @@ pub struct Exec {
 }
 
 impl Exec {
+    /// On the caller's thread, without special instructions: for what is prepared once.
+    #[must_use]
+    pub fn sequential() -> Self {
+        Self {
+            level: Level::fallback(),
+            threads: 1,
+        }
+    }
+
     /// Runs `f(index, chunk)` for every chunk of `size` elements, in parallel if there are threads for it.
     pub fn for_each_chunk<T: Send>(
         &self,

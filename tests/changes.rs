@@ -4,6 +4,7 @@
 use glam::{DMat4, DVec3};
 use proptest::prelude::*;
 use specula::backend::recording::{Call, RecordingBackend};
+use specula::parallel::Exec;
 use specula::scene::{
     Camera, Changes, GeometryChange, Light, LightKind, Material, Placement, Scene, World,
 };
@@ -195,7 +196,7 @@ proptest! {
             edit.apply(&mut scene);
             // Not every state is looked at, so that changes come together.
             if is_frame {
-                placement.update(&mut world, &scene);
+                placement.update(Exec::sequential(), &mut world, &scene);
                 prop_assert!(world == World::new(&scene), "{edit:?}");
                 let (frame, _) = render(&mut tested, &scene);
                 let (expected, _) = render(&mut engine(&scene), &scene);
@@ -211,7 +212,7 @@ fn each_change_costs_what_depends_on_it() {
     let (mut placement, mut world) = Placement::new(&scene);
     let mut update = |edit: Edit| {
         edit.apply(&mut scene);
-        placement.update(&mut world, &scene)
+        placement.update(Exec::sequential(), &mut world, &scene)
     };
     let (none, moved, replaced) = (
         GeometryChange::None,

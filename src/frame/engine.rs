@@ -289,7 +289,8 @@ impl Renderer {
         target: &mut Target<'_>,
     ) -> FrameStats {
         let mut stages = StageTimes::default();
-        self.adopt(scene);
+        self.adopt(exec, scene);
+        stages.cull += allowance.elapsed_ms();
         let view = self
             .world
             .view(scene.camera(), target.width(), target.height());
@@ -351,8 +352,8 @@ impl Renderer {
     }
 
     /// Takes over what has changed of the scene.
-    fn adopt(&mut self, scene: &Scene) {
-        let changes = self.placement.update(&mut self.world, scene);
+    fn adopt(&mut self, exec: Exec, scene: &Scene) {
+        let changes = self.placement.update(exec, &mut self.world, scene);
         match changes.geometry {
             GeometryChange::None => {}
             GeometryChange::Moved => {

@@ -39,7 +39,7 @@ impl fmt::Display for Outcome {
 /// Milliseconds spent in each stage of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {
-    /// Culling clusters.
+    /// Taking over what has changed of the scene, and culling clusters.
     pub cull: f64,
     /// Illuminating vertices.
     pub shade: f64,

@@ -20,6 +20,7 @@ use super::part::{Part, mirrors};
 use super::{Extent, Material, Object, Revisions, Scene, World, defaults};
 use crate::geometry::Topology;
 use crate::math::power_of_two_scale;
+use crate::parallel::Exec;
 use glam::DVec3;
 
 /// The scene may reach so many times as far as it does at rest before origin and scale change: two bits of the 24 of an
@@ -109,7 +110,7 @@ impl Placement {
             parts,
         };
         placement.weld(&mut world, scene);
-        placement.move_parts(&mut world, scene);
+        placement.move_parts(Exec::sequential(), &mut world, scene);
         placement.assign_materials(&mut world, scene);
         world.set_lights(&scene.lights);
         world.set_background(scene.background);
@@ -117,7 +118,7 @@ impl Placement {
     }
 
     /// Brings `world` from the state of the scene that was seen last to its present one.
-    pub fn update(&mut self, world: &mut World, scene: &Scene) -> Changes {
+    pub fn update(&mut self, exec: Exec, world: &mut World, scene: &Scene) -> Changes {
         let (known, now) = (self.revisions, scene.revisions);
         let has_moved = now.transforms != known.transforms;
         let has_other_materials = now.materials != known.materials;
@@ -131,7 +132,7 @@ impl Placement {
         self.revisions = now;
         let mut changes = Changes::default();
         if has_moved {
-            changes.geometry = self.move_parts(world, scene);
+            changes.geometry = self.move_parts(exec, world, scene);
         }
         if has_other_materials {
             changes.shading = true;
@@ -206,7 +207,7 @@ impl Placement {
     }
 
     /// Moves objects to where the scene has them now.
-    fn move_parts(&mut self, world: &mut World, scene: &Scene) -> GeometryChange {
+    fn move_parts(&mut self, exec: Exec, world: &mut World, scene: &Scene) -> GeometryChange {
         let anchor = self.anchor(scene);
         let is_new_anchor = anchor != Anchor::of(world);
         anchor.set(world);
@@ -214,7 +215,7 @@ impl Placement {
         for (part, object) in self.parts.iter_mut().zip(&scene.objects) {
             if is_new_anchor || part.place != object.author_from_mesh {
                 part.place = object.author_from_mesh;
-                part.put(world, &object.mesh);
+                part.put(exec, world, &object.mesh);
                 change = GeometryChange::Moved;
             }
         }
