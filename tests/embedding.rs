@@ -180,3 +180,30 @@ fn an_engine_may_move_between_threads_and_run_in_the_callers_pool() {
     });
     assert!(inside.pixels() == wanted.pixels());
 }
+
+#[test]
+fn warming_up_changes_nothing_but_time() {
+    let scene = scene();
+    let film = |engine: &mut Engine, bytes: &mut [u8], age: u32| -> Vec<(u64, u64)> {
+        let frame = |number: u32| {
+            let age = if number == 0 { age } else { 1 };
+            let target = Target::new(bytes, WIDTH, HEIGHT).expect("there is room");
+            let stats = engine.render_into(&scene, Budget::Work(50_000), target.with_age(age));
+            (stats.frame, stats.work_units)
+        };
+        (0..3).map(frame).collect()
+    };
+    let blank = vec![0_u8; (WIDTH * HEIGHT * 4) as usize];
+    let (mut expected, mut bytes) = (blank.clone(), blank);
+    let frames = film(&mut engine(&scene, options(1)), &mut expected, 0);
+    let mut warm = engine(&scene, options(1));
+    warm.warm_up(&scene, WIDTH, HEIGHT);
+    assert_eq!(film(&mut warm, &mut bytes, 0), frames);
+    assert!(bytes == expected);
+    // The buffer does not hold what was rendered to warm up.
+    bytes.fill(0);
+    warm.warm_up(&scene, WIDTH, HEIGHT);
+    let again = film(&mut warm, &mut bytes, 1);
+    assert_eq!(again[0], (frames[2].0 + 1, frames[0].1));
+    assert!(bytes == expected);
+}

@@ -106,6 +106,9 @@ pub(super) fn run(args: &Inspect) -> Result<(), Failure> {
         (None, Some(units)) => Budget::Work(units),
         (None, None) => Budget::Unlimited,
     };
+    if args.budget.is_some() {
+        engine.warm_up(&scene, size.width, size.height);
+    }
     let mut stats = engine.render(&scene, budget, &mut frame);
     for _ in 1..args.frames {
         stats = engine.render(&scene, budget, &mut frame);

@@ -93,6 +93,9 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
         (None, None) => Budget::Unlimited,
     };
 
+    if args.budget.is_some() {
+        engine.warm_up(&scene, size.width, size.height);
+    }
     let mut output = Output::new();
     for number in 1..=args.frames {
         let stats = engine.render(&scene, budget, &mut frame);

@@ -122,6 +122,15 @@ struct Renderer {
 /// Buffers older than this many frames are written anew: nobody queues more.
 const MOST_AGE: usize = 16;
 
+/// The first frame touches memory; those after it are for threads that have just been started.
+const WARM_UP_FRAMES: usize = 3;
+
+/// Refinement of a frame that warms up, in work units.
+const WARM_UP_UNITS: u64 = 1_000_000;
+
+/// Refinement ends so much before it has to: what comes after it does not always take the same time.
+const MARGIN_MS: f64 = 0.03;
+
 /// A frame of fewer pixels handed over does not tell how long one takes.
 const LEAST_PIXELS_TO_LEARN_FROM: u64 = 1 << 15;
 
@@ -225,6 +234,21 @@ impl Engine {
         }
     }
 
+    /// Makes ready for frames of this size: touches the memory they need and wakes the threads, so that the first one is
+    /// as fast as those after it. Forgets the current image.
+    pub fn warm_up(&mut self, scene: &Scene, width: u32, height: u32) {
+        let mut frame = Frame::new(width, height);
+        let frames = self.renderer.frames;
+        for _ in 0..WARM_UP_FRAMES {
+            self.forget();
+            self.render(scene, Budget::Work(WARM_UP_UNITS), &mut frame);
+        }
+        self.forget();
+        // Nobody has seen these frames.
+        self.renderer.frames = frames;
+        self.renderer.handed_over.clear();
+    }
+
     /// Forgets the current image, so that the next frame starts cold. Memory stays allocated and threads stay awake.
     pub fn forget(&mut self) {
         self.renderer.seen = None;
@@ -305,13 +329,14 @@ impl Renderer {
         }
 
         let refining_since = allowance.elapsed_ms();
-        let mut drawing_ms = 0.0;
+        let mut drawing_ms = None;
         if self.method.is_progressive() {
             drawing_ms = self.refine(exec, &view, &mut allowance, target);
         }
         let presenting_since = allowance.elapsed_ms();
-        stages.refine += presenting_since - refining_since - drawing_ms;
-        stages.resolve += drawing_ms;
+        let drawing = drawing_ms.unwrap_or(0.0);
+        stages.refine += presenting_since - refining_since - drawing;
+        stages.resolve += drawing;
 
         let pixels_written = self.backend.present(exec, target);
         self.handed_over.truncate(MOST_AGE - 1);
@@ -328,7 +353,7 @@ impl Renderer {
             frame: self.frames + 1,
             frame_ms,
             outcome: match (is_new, allowance.spent_units(), converged) {
-                (false, 0, _) => Outcome::Unchanged,
+                (false, 0, _) if drawing_ms.is_none() => Outcome::Unchanged,
                 (_, _, true) => Outcome::Complete,
                 (true, 0, false) => Outcome::BaseOnly,
                 (_, _, false) => Outcome::Refined,
@@ -447,14 +472,14 @@ impl Renderer {
     }
 
     /// Spends what is left of the budget, less what handing the image over will take. Returns the milliseconds that drawing
-    /// took, where that comes after refinement.
+    /// took, where that comes after refinement and was done.
     fn refine(
         &mut self,
         exec: Exec,
         view: &View,
         allowance: &mut Allowance<'_>,
         target: &Target<'_>,
-    ) -> f64 {
+    ) -> Option<f64> {
         let refines_first = self.refines_first();
         let mut stage = super::refinement::Stage {
             exec,
@@ -465,7 +490,7 @@ impl Renderer {
         };
         if refines_first {
             let pixels = u64::from(view.width) * u64::from(view.height);
-            let presenting_ms = self.presenting.predict_ms(pixels);
+            let presenting_ms = self.presenting.predict_ms(pixels) + MARGIN_MS;
             return self.refine_first.frame(
                 &mut self.refinement,
                 &mut stage,
@@ -475,9 +500,9 @@ impl Renderer {
         }
         loop {
             let pending = stage.backend.pending_pixels(target);
-            allowance.reserve_ms(self.presenting.predict_ms(pending));
+            allowance.reserve_ms(self.presenting.predict_ms(pending) + MARGIN_MS);
             if !self.refinement.step(&mut stage, allowance) {
-                return 0.0;
+                return None;
             }
         }
     }

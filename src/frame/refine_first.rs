@@ -4,9 +4,8 @@
 //! everything is drawn, unless nothing has been refined since it was drawn last; so a still view that is good enough
 //! costs nothing.
 //!
-//! The more is refined, the longer drawing takes, until no budget is left for refining. A frame that cannot refine for
-//! that reason refines *without drawing*, in time: the image stays as it is. When there is nothing left to refine, one
-//! frame draws the result, late if need be. So a still view converges under any budget that plans at all.
+//! The more is refined, the longer drawing takes, until no budget is left for refining. Then a still view stays as it
+//! is: it has become as good as can be drawn within the budget, which is not final if the budget is small.
 
 use super::refinement::{DrawnLeaves, Refinement, Stage};
 use crate::backend::BasePaint;
@@ -47,38 +46,28 @@ impl RefineFirst {
     }
 
     /// Refines within the budget, then draws if that makes a difference. `presenting_ms` is what handing the image over
-    /// will take. Returns the milliseconds that drawing took.
+    /// will take. Returns the milliseconds that drawing took, if anything was drawn.
     pub(super) fn frame(
         &mut self,
         refinement: &mut Refinement,
         stage: &mut Stage<'_>,
         allowance: &mut Allowance<'_>,
         presenting_ms: f64,
-    ) -> f64 {
-        let mut has_refined = false;
+    ) -> Option<f64> {
         loop {
             allowance.reserve_ms(self.predict_ms(refinement) + presenting_ms);
             if !refinement.step(stage, allowance) {
                 break;
             }
-            has_refined = true;
-        }
-        if self.drawn.is_some() && !has_refined && !refinement.is_finished() {
-            // Drawing would leave no time to refine.
-            allowance.reserve_ms(0.0);
-            while refinement.step(stage, allowance) {}
-            if !refinement.is_finished() {
-                return 0.0;
-            }
         }
         if self.is_up_to_date(refinement) {
-            return 0.0;
+            return None;
         }
         let since = allowance.elapsed_ms();
         self.draw(refinement, stage);
         let ms = allowance.elapsed_ms() - since;
         self.drawing.learn(nominal_ns(refinement), ms);
-        ms
+        Some(ms)
     }
 
     fn predict_ms(&self, refinement: &Refinement) -> f64 {

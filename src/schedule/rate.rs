@@ -3,8 +3,10 @@
 //! They tell how much of a wall-clock budget to keep for what must follow refinement. They never decide what is refined,
 //! or in which order: nominal costs do that.
 
-/// Weight of the newest measurement.
-const NEWEST: f64 = 0.25;
+/// Weight of a measurement that is above what was thought, and of one below. Too low a prediction makes a frame late, too
+/// high a one costs a little refinement; so predictions rise quickly and fall slowly.
+const WEIGHT_ABOVE: f64 = 0.5;
+const WEIGHT_BELOW: f64 = 0.1;
 
 /// Nanoseconds per item of a kind of work, as a moving average of measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +30,13 @@ impl LearnedRate {
     pub fn learn(&mut self, items: u64, ms: f64) {
         let measured = ms * 1e6 / items as f64;
         if items >= self.least_items && measured > 0.0 && measured.is_finite() {
-            self.ns_per_item += NEWEST * (measured - self.ns_per_item);
+            let difference = measured - self.ns_per_item;
+            let weight = if difference > 0.0 {
+                WEIGHT_ABOVE
+            } else {
+                WEIGHT_BELOW
+            };
+            self.ns_per_item += weight * difference;
         }
     }
 
@@ -56,5 +64,15 @@ mod tests {
             rate.learn(1_000_000, 3.0);
         }
         assert!((rate.predict_ms(1_000_000) - 3.0).abs() < 0.01);
+        for _ in 0..80 {
+            rate.learn(1_000_000, 2.0);
+        }
+        assert!((rate.predict_ms(1_000_000) - 2.0).abs() < 0.01);
+        // As often above as below: it stays nearer to what is above.
+        for _ in 0..40 {
+            rate.learn(1_000_000, 1.0);
+            rate.learn(1_000_000, 3.0);
+        }
+        assert!(rate.predict_ms(1_000_000) > 2.5);
     }
 }

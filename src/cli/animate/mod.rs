@@ -150,6 +150,9 @@ impl Job<'_> {
             },
         )?;
         let mut frame = Frame::new(size.width, size.height);
+        if args.budget.is_some() {
+            engine.warm_up(&self.scene, size.width, size.height);
+        }
         let mut film = self
             .destination
             .clone()
