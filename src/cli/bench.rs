@@ -34,7 +34,7 @@ Examples:
   For a script:
     specula bench scenes/teapot.ron --method phong --error 0 --json | jq .frame_ms_median")]
 pub(super) struct Bench {
-    /// Scene file (RON)
+    /// Scene file (.ron), or a mesh (.obj), which gets a camera, lights and a material
     scene: PathBuf,
 
     /// Views around the scene

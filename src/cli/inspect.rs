@@ -1,9 +1,9 @@
 //! `specula inspect`: what a view consists of, in numbers and drawn over the image.
 
-use super::Failure;
-use super::args::{Machine, count, milliseconds, name_of, require_png};
+use super::args::{Machine, count, milliseconds, name_of, require_png, time};
 use super::console::{Output, note};
 use super::report::{label, list};
+use super::{Failure, animate};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use specula::frame::{Engine, EngineOptions, FrameStats, Method};
@@ -44,8 +44,12 @@ Examples:
   Numbers for a script:
     specula inspect scenes/teapot.ron --json | jq .pht")]
 pub(super) struct Inspect {
-    /// Scene file (RON)
+    /// Scene file (.ron), or a mesh (.obj), which gets a camera, lights and a material
     pub(super) scene: PathBuf,
+
+    /// Look at the scene's animation after this many seconds, as `specula animate` films it
+    #[arg(long, value_name = "S", value_parser = time, allow_negative_numbers = true)]
+    time: Option<f64>,
 
     /// Draw the triangles, highlights and refinement over the image, and write it; the name ends in .png
     #[arg(long, value_name = "OUT.png")]
@@ -90,7 +94,10 @@ pub(super) fn run(args: &Inspect) -> Result<(), Failure> {
         require_png(path)?;
         png::check_writable(path)?;
     }
-    let scene = Scene::load(&args.scene)?;
+    let mut scene = Scene::load(&args.scene)?;
+    if let Some(seconds) = args.time {
+        animate::go_to_time(&mut scene, seconds);
+    }
     let options = EngineOptions {
         method: args.method,
         backend: args.machine.backend,

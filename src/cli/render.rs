@@ -97,8 +97,10 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
         engine.warm_up(&scene, size.width, size.height);
     }
     let mut output = Output::new();
+    let mut is_empty = false;
     for number in 1..=args.frames {
         let stats = engine.render(&scene, budget, &mut frame);
+        is_empty = stats.covered_pixels == 0;
         let error = (args.error && number == args.frames)
             .then(|| compare(&engine, &scene, &frame, args))
             .transpose()?;
@@ -114,6 +116,9 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
         })?;
     }
     frame.save_png(&args.output)?;
+    if is_empty {
+        note("nothing of the scene is in the image");
+    }
     note(&format!(
         "wrote {} ({}x{})",
         args.output.display(),

@@ -4,6 +4,7 @@ pub mod bary;
 mod closed;
 pub mod clusters;
 pub mod import;
+mod mesh;
 pub mod normals;
 pub mod polygon;
 pub mod screen;
@@ -13,20 +14,8 @@ pub mod viewport;
 
 pub use bary::Bary;
 pub use clusters::{Cluster, build_clusters};
+pub use mesh::{Mesh, MeshError};
 pub use topology::Topology;
-
-use glam::DVec3;
-
-/// A triangle mesh in the author space of its shape.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mesh {
-    /// Vertex positions.
-    pub positions: Vec<DVec3>,
-    /// Unit vertex normals, one for each position.
-    pub normals: Vec<DVec3>,
-    /// Vertex indices, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-}
 
 /// Many three-component vectors, one array per component, ready for SIMD lanes.
 #[derive(Clone, Debug, Default, PartialEq)]

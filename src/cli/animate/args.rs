@@ -37,7 +37,7 @@ Examples:
   Frame times for a script:
     specula animate scenes/turntable.ron -o film.apng --budget 4 --json | jq .frame_ms")]
 pub(in crate::cli) struct Animate {
-    /// Scene file (RON)
+    /// Scene file (.ron), or a mesh (.obj), which gets a camera, lights and a material
     pub(super) scene: PathBuf,
 
     /// What to write: a .apng, .png or .y4m file, numbered files such as frames/####.png, or - for Y4M on standard

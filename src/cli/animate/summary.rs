@@ -56,7 +56,7 @@ impl Summary {
         if self.kept > 0 {
             let were = if self.kept == 1 { "was" } else { "were" };
             lines.push(format!(
-                "  kept       {} that {were} there already",
+                "  kept       {} that {were} there already (--overwrite renders them anew)",
                 frames(self.kept as usize)
             ));
         }
@@ -128,7 +128,7 @@ mod tests {
             "3 frames of 8x6 in 2.0 s, 1.5 a second\n  \
              rendering  median 4.00 ms, p99 5.00 ms, longest 5.00 ms a frame; budget 4.00 ms: 1 late\n  \
              error      about 1.00 codes (mean of the estimates)\n  \
-             kept       1 frame that was there already"
+             kept       1 frame that was there already (--overwrite renders them anew)"
         );
         assert_eq!(
             Summary::default().text([8, 6], Duration::ZERO),
