@@ -263,6 +263,43 @@ fn faces_without_area_change_nothing_but_get_unit_normals() {
     }
 }
 
+#[test]
+fn a_corner_that_a_face_repeats_has_the_normal_of_the_face() {
+    // Another face, first in the file, meets this one at right angles.
+    let vertices = "v 0 0 0\nv 0 1 0\nv 0 0 1\nv 0 1 1\nv 1 0 0\nv 1 1 0\n";
+    for face in [
+        "1 2 3",
+        "1 2 2 3",
+        "1 1 2 3",
+        "1 2 3 3",
+        "1 2 3 1",
+        "1 2 4 4 3",
+        "2 2 3 1 2 2",
+    ] {
+        for normals in [
+            Normals::Flat,
+            smooth(60.0, Weight::Angle),
+            smooth(60.0, Weight::Area),
+        ] {
+            let mesh = read(&format!("{vertices}f 1 5 6 2\nf {face}\n"), normals);
+            let mut faces = 0;
+            for &t in &mesh.triangles {
+                let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
+                if (b - a).cross(c - a) == DVec3::ZERO {
+                    continue;
+                }
+                faces += 1;
+                let normal = face_normal(&mesh, t);
+                for v in t {
+                    let off = mesh.normals[v as usize] - normal;
+                    assert!(off.length() < 1e-12, "f {face}, {normals:?}: {off}");
+                }
+            }
+            assert!(faces >= 3, "f {face}: {faces}");
+        }
+    }
+}
+
 /// Twice the signed area of a flat polygon, by the shoelace formula.
 fn shoelace(points: &[[f64; 2]]) -> f64 {
     (0..points.len())

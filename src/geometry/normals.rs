@@ -151,26 +151,38 @@ fn corners(polygons: &Polygons, weight: Weight) -> Vec<Corner> {
     for range in polygons.ranges() {
         // Corners at the same position as the one before add nothing to the shape.
         ring.clear();
-        ring.extend(range.map(|corner| (corner, polygons.corners[corner])));
-        ring.dedup_by_key(|&mut (_, position)| position);
-        if ring.len() > 1 && ring[0].1 == ring[ring.len() - 1].1 {
+        ring.extend(polygons.corners[range.clone()].iter().copied());
+        ring.dedup();
+        if ring.len() > 1 && ring[0] == ring[ring.len() - 1] {
             ring.pop();
         }
         points.clear();
-        points.extend(ring.iter().map(|&(_, position)| place(position)));
+        points.extend(ring.iter().map(|&position| place(position)));
         let (normal, area) = direction(&points);
-        for (k, &(corner, _)) in ring.iter().enumerate() {
+        let weight_at = |before: usize, k: usize, after: usize| match weight {
+            Weight::Equal => 1.0,
+            Weight::Area => area,
+            Weight::Angle => angle([points[before], points[k], points[after]], normal),
+        };
+        let (mut k, mut is_first) = (0, true);
+        for corner in range {
+            if polygons.corners[corner] != ring[k] {
+                k = (k + 1) % ring.len();
+                is_first = k > 0;
+            }
             let before = (k + ring.len() - 1) % ring.len();
             let after = (k + 1) % ring.len();
             corners[corner] = Corner {
                 normal,
-                weight: match weight {
-                    Weight::Equal => 1.0,
-                    Weight::Area => area,
-                    Weight::Angle => angle([points[before], points[k], points[after]], normal),
+                // A repeated corner is of the same fan, which counts the face once.
+                weight: if is_first {
+                    weight_at(before, k, after)
+                } else {
+                    0.0
                 },
-                neighbours: [ring[before].1, ring[after].1],
+                neighbours: [ring[before], ring[after]],
             };
+            is_first = false;
         }
     }
     corners
