@@ -1,8 +1,9 @@
 //! Rendering into memory, pools and threads of the caller.
 
+use specula::geometry::screen::MAX_IMAGE_SIDE;
 use specula::output::{ChannelOrder, Target};
 use specula::scene::Camera;
-use specula::{Budget, Engine, EngineOptions, Frame, Method, Scene};
+use specula::{BackendKind, Budget, Engine, EngineOptions, Frame, Method, Scene};
 use std::sync::Arc;
 
 const WIDTH: u32 = 150;
@@ -206,4 +207,28 @@ fn warming_up_changes_nothing_but_time() {
     let again = film(&mut warm, &mut bytes, 1);
     assert_eq!(again[0], (frames[2].0 + 1, frames[0].1));
     assert!(bytes == expected);
+}
+
+#[test]
+fn a_frame_that_is_too_large_is_left_alone_by_every_backend() {
+    let scene = scene();
+    for backend in BackendKind::ALL {
+        let options = EngineOptions {
+            backend,
+            ..options(1)
+        };
+        let mut engine = engine(&scene, options);
+        let most = MAX_IMAGE_SIDE;
+        for (width, height, is_drawn) in [
+            (most, 2, true),
+            (most + 1, 2, false),
+            (2, u32::from(u16::MAX), false),
+        ] {
+            let mut frame = Frame::new(width, height);
+            frame.pixels_mut().fill([1, 2, 3, 4]);
+            engine.render(&scene, Budget::Work(0), &mut frame);
+            let is_untouched = frame.pixels().iter().all(|&pixel| pixel == [1, 2, 3, 4]);
+            assert_eq!(is_untouched, !is_drawn, "{backend}, {width}x{height}");
+        }
+    }
 }

@@ -7,6 +7,7 @@ use super::refinement::{Leaf, Refinement, for_each_leaf};
 use super::stats::{FrameStats, Outcome, StageTimes};
 use crate::backend::{Backend, BackendKind};
 use crate::clock::{Clock, SystemClock};
+use crate::geometry::screen::MAX_IMAGE_SIDE;
 use crate::output::{Frame, Stamp, Target};
 use crate::parallel::Exec;
 use crate::scene::{GeometryChange, Placement, Scene, View, World};
@@ -202,7 +203,8 @@ impl Engine {
     /// it is done again: with other lights or materials, the owners of all pixels stay known; with another camera or
     /// image size, the scene stays prepared; objects that move are placed anew, and others are not.
     ///
-    /// It never fails: a scene is validated when it is made.
+    /// It never fails: a scene is validated when it is made. A frame with a side of more than [`MAX_IMAGE_SIDE`] pixels is left
+    /// as it is.
     pub fn render(&mut self, scene: &Scene, budget: Budget, frame: &mut Frame) -> FrameStats {
         frame.write(|target| self.render_target(scene, budget, target))
     }
@@ -315,9 +317,10 @@ impl Renderer {
         let mut stages = StageTimes::default();
         self.adopt(exec, scene);
         stages.cull += allowance.elapsed_ms();
-        let view = self
-            .world
-            .view(scene.camera(), target.width(), target.height());
+        // A larger image is none: backends leave a target alone that does not have the view's size.
+        let [width, height] =
+            [target.width(), target.height()].map(|side| side.min(MAX_IMAGE_SIDE));
+        let view = self.world.view(scene.camera(), width, height);
 
         let is_seen = self.seen == Some(view);
         if !is_seen {

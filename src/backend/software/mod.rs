@@ -46,8 +46,7 @@ use visible::Visible;
 
 /// The tiled software rasterizer: knows the owner of every pixel, and can illuminate every pixel.
 ///
-/// Images are at most [`MAX_IMAGE_SIDE`](crate::geometry::screen::MAX_IMAGE_SIDE) pixels wide and high; what lies beyond is
-/// not drawn.
+/// Images are at most [`MAX_IMAGE_SIDE`](crate::geometry::screen::MAX_IMAGE_SIDE) pixels wide and high.
 pub struct SoftwareBackend {
     writer: u64,
     /// Counts the passes that may change colours.
