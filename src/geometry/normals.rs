@@ -269,12 +269,12 @@ impl Fans {
     }
 }
 
-/// The first corner of the fan of `local`, as far as it is known; halves the way there for the next time.
-fn root(parent: &mut [u32], mut local: u32) -> u32 {
-    while parent[local as usize] != local {
-        let above = parent[parent[local as usize] as usize];
-        parent[local as usize] = above;
-        local = above;
+/// The first member of the set of `member`, as far as it is known; halves the way there for the next time.
+pub(super) fn root(parent: &mut [u32], mut member: u32) -> u32 {
+    while parent[member as usize] != member {
+        let above = parent[parent[member as usize] as usize];
+        parent[member as usize] = above;
+        member = above;
     }
-    local
+    member
 }
