@@ -40,7 +40,6 @@ mod tile;
 
 use super::{Backend, BasePaint, Capabilities, Geometry, Interpolation, RasterCounts, new_writer};
 use crate::output::encode::encode_codes;
-
 use crate::output::target::PIXEL_BYTES;
 use crate::output::{ChannelOrder, Stamp, Target};
 use crate::parallel::Exec;

@@ -11,6 +11,9 @@
 //! * A split that was found not to help is carried out when the leaf's turn comes again, later: there is nothing else
 //!   to be done about it, and smaller leaves get there in the end.
 //! * Pixels are estimated by area inside the image.
+//!
+//! Which of several good subdivisions comes out depends on the order of splits, hence on where frames ended: a converged image
+//! may differ from one refined in a single frame by what the estimates tolerate.
 
 use super::ranking::{self, Action};
 use super::{Refinement, Stage};

@@ -33,14 +33,15 @@ pub struct Leaf {
     /// Linear, unclamped colours at its corners by which it is interpolated, or was before it was shaded per pixel. Zero
     /// for [`Method::Phong`], which has none.
     pub colours: [[f32; 3]; 3],
-    /// Pixels that it owns. An estimate where it has not been painted, and for parts of a large leaf that is shaded per
-    /// pixel part by part.
+    /// Pixels that it owns. An estimate where it has not been painted, for parts of a large leaf that is shaded per
+    /// pixel part by part, and for whatever a backend draws that does not know owners.
     pub pixels: u32,
     /// How often the triangle has been quartered to get a leaf of this area; halves count as quarters.
     pub level: u32,
     /// How it is coloured.
     pub kind: LeafKind,
-    /// Whether the image shows it already.
+    /// Whether the image shows it already. Not known, and true, on a backend that draws everything once: it may have
+    /// been refined in a frame that had no time left to draw.
     pub is_painted: bool,
     /// Whether its triangle passes the paper's test for some light. False with methods that do not test.
     pub is_pht: bool,
