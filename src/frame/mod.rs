@@ -6,11 +6,13 @@
 mod base;
 mod engine;
 mod method;
+mod options;
 mod refine_first;
 mod refinement;
 mod stats;
 
-pub use engine::{Engine, EngineError, EngineOptions};
+pub use engine::Engine;
 pub use method::Method;
+pub use options::{EngineError, EngineOptions};
 pub use refinement::{Leaf, LeafKind};
 pub use stats::{FrameStats, Outcome, Skipped, StageTimes};

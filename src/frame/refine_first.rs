@@ -14,6 +14,9 @@ use crate::schedule::{Allowance, LearnedRate, cost};
 /// Drawings of less nominal time say more about overheads than about the rate.
 const LEAST_NS_TO_LEARN_FROM: u64 = 100_000;
 
+/// Drawing takes longer than predicted from what there is to draw now.
+const GROWTH: f64 = 1.1;
+
 /// What drawing has cost so far, and which state of refinement was drawn last.
 #[derive(Debug)]
 pub(super) struct RefineFirst {
@@ -70,8 +73,9 @@ impl RefineFirst {
         Some(ms)
     }
 
+    /// What drawing will take, the leaves that the next piece of planning adds included.
     fn predict_ms(&self, refinement: &Refinement) -> f64 {
-        self.drawing.predict_ms(nominal_ns(refinement))
+        self.drawing.predict_ms(nominal_ns(refinement)) * GROWTH
     }
 
     fn draw(&mut self, refinement: &Refinement, stage: &mut Stage<'_>) {

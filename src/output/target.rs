@@ -8,6 +8,11 @@
 /// Bytes of a pixel.
 pub const PIXEL_BYTES: usize = 4;
 
+/// Bytes of a row of pixels without a gap. Where that leaves `usize`, no memory is large enough for it either.
+fn row_bytes(width: u32) -> usize {
+    (width as usize).saturating_mul(PIXEL_BYTES)
+}
+
 /// The order of a pixel's bytes in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ChannelOrder {
@@ -24,7 +29,7 @@ pub enum ChannelOrder {
 pub enum TargetError {
     /// Rows would overlap.
     #[error(
-        "rows of {width} pixels need {} bytes each, but the stride is {stride}", *width as usize * PIXEL_BYTES
+        "rows of {width} pixels need {} bytes each, but the stride is {stride}", row_bytes(*width)
     )]
     StrideTooSmall {
         /// Pixels of a row.
@@ -90,7 +95,7 @@ impl<'a> Target<'a> {
     /// # Errors
     /// When there are too few bytes.
     pub fn new(bytes: &'a mut [u8], width: u32, height: u32) -> Result<Self, TargetError> {
-        Self::with_stride(bytes, width, height, width as usize * PIXEL_BYTES)
+        Self::with_stride(bytes, width, height, row_bytes(width))
     }
 
     /// A target whose rows begin `stride` bytes apart, of unknown contents. Bytes between rows are not touched.
@@ -103,7 +108,7 @@ impl<'a> Target<'a> {
         height: u32,
         stride: usize,
     ) -> Result<Self, TargetError> {
-        let row = width as usize * PIXEL_BYTES;
+        let row = row_bytes(width);
         if stride < row {
             return Err(TargetError::StrideTooSmall { width, stride });
         }

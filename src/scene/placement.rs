@@ -139,7 +139,7 @@ impl Placement {
             self.assign_materials(world, scene);
         }
         // Which lights are far away depends on the size of the scene.
-        if now.lights != known.lights || has_moved {
+        if now.lights != known.lights || changes.geometry != GeometryChange::None {
             changes.shading = true;
             world.set_lights(&scene.lights);
         }
