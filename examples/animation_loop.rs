@@ -20,6 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rest = scene.objects()[0].author_from_mesh;
     let mut engine = Engine::new(&scene)?;
     let mut frame = Frame::new(1280, 720);
+    engine.warm_up(&scene, frame.width(), frame.height());
 
     let mut times = Vec::new();
     for number in 0..frames {
