@@ -79,6 +79,10 @@ const EXPECTED: &[(&str, &str)] = &[
         "2:56: `camera.height` must be above 0, but is 0",
     ),
     (
+        "camera_no_kind",
+        "3:13: the kind is missing here: one of `Perspective(..)`, `Orthographic(..)`",
+    ),
+    (
         "camera_kind",
         "2:13: unknown kind `Fisheye`; the kinds are `Perspective` and `Orthographic`",
     ),
@@ -152,6 +156,10 @@ const EXPECTED: &[(&str, &str)] = &[
         "4:47: `lights[1].intensity` must not be negative, but is -1",
     ),
     (
+        "light_no_kind",
+        "3:14: the kind is missing here: one of `Point(..)`, `Directional(..)`",
+    ),
+    (
         "light_kind",
         "4:9: unknown kind `Spot`; the kinds are `Point` and `Directional`",
     ),
@@ -223,6 +231,10 @@ const EXPECTED: &[(&str, &str)] = &[
     (
         "mesh_normals_flat_with_fields",
         "4:41: nothing may follow this value",
+    ),
+    (
+        "mesh_normals_no_parentheses",
+        "4:37: `Smooth` needs parentheses, also where all fields are left out: `Smooth()`",
     ),
     (
         "mesh_normals_kind",
@@ -324,8 +336,12 @@ const EXPECTED: &[(&str, &str)] = &[
         "4:17: unknown kind `Cube`; the kinds are `Teapot`, `Sphere`, `Torus`, `Plane` and `Box`",
     ),
     (
+        "shape_in_quotes",
+        "2:23: the kind is missing here: one of `Teapot(..)`, `Sphere(..)`, `Torus(..)`, `Plane(..)`, `Box(..)`",
+    ),
+    (
         "shape_no_parentheses",
-        "4:23: fields in parentheses `(name: value, ..)` are needed here",
+        "4:17: `Teapot` needs parentheses, also where all fields are left out: `Teapot()`",
     ),
     (
         "shape_sphere_radius",

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::args::{Machine, count, milliseconds, name_of, not_negative};
-use super::console::{Output, Progress};
+use super::console::{Output, Progress, note};
 use super::machine::cpu_model;
 use clap::Args;
 use specula::Method;
@@ -179,6 +179,11 @@ fn sweep_scene(
         let calibration = sweep.calibrate()?;
         drop(preparing);
         report.calibrated(name, &calibration, options.calibration_frames)?;
+        if calibration.phong_ms <= calibration.gouraud_ms {
+            note(&format!(
+                "{name}: Phong shading took no longer than Gouraud shading, so all fractions are the same budget"
+            ));
+        }
         let fractions = args.fractions.iter();
         fractions.map(|&f| calibration.budget(f)).collect()
     } else {

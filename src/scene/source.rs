@@ -103,6 +103,33 @@ impl<'a> Source<'a> {
         })
     }
 
+    /// Parses a value of one of several kinds, each a name with its fields in parentheses, or a name alone. What is easily
+    /// left out, the name or the parentheses, is asked for by name.
+    pub(super) fn parse_kind<T: Deserialize<'a>>(
+        &self,
+        raw: Raw<'a>,
+        with_fields: &[&str],
+        bare: &[&str],
+    ) -> Result<T, SceneError> {
+        let is_name = |c: char| c.is_alphanumeric() || c == '_';
+        if raw.0.starts_with(|c| !is_name(c) || c.is_numeric()) {
+            let kinds = with_fields.iter().map(|kind| format!("`{kind}(..)`"));
+            let kinds: Vec<_> = kinds
+                .chain(bare.iter().map(|kind| format!("`{kind}`")))
+                .collect();
+            let message = format!("the kind is missing here: one of {}", kinds.join(", "));
+            return Err(self.error(raw, message));
+        }
+        let name = raw.0.trim_end();
+        if with_fields.contains(&name) {
+            let message = format!(
+                "`{name}` needs parentheses, also where all fields are left out: `{name}()`"
+            );
+            return Err(self.error(raw, message));
+        }
+        self.parse(raw)
+    }
+
     /// An error at the start of `raw`.
     pub(super) fn error(&self, raw: Raw<'a>, message: impl Display) -> SceneError {
         self.invalid(self.position(raw), message)

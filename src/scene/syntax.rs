@@ -66,6 +66,10 @@ pub(super) enum CameraEntry<'a> {
     },
 }
 
+impl CameraEntry<'_> {
+    pub(super) const KINDS: &'static [&'static str] = &["Perspective", "Orthographic"];
+}
+
 /// One of `lights:`
 #[derive(Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields, rename = "Light", bound(deserialize = "'de: 'a"))]
@@ -82,6 +86,10 @@ pub(super) enum LightEntry<'a> {
         intensity: Option<Raw<'a>>,
         orbit: Option<Raw<'a>>,
     },
+}
+
+impl LightEntry<'_> {
+    pub(super) const KINDS: &'static [&'static str] = &["Point", "Directional"];
 }
 
 /// One of `materials:`
@@ -161,6 +169,11 @@ pub(super) enum NormalsEntry<'a> {
     Flat,
 }
 
+impl NormalsEntry<'_> {
+    pub(super) const WITH_FIELDS: &'static [&'static str] = &["Smooth"];
+    pub(super) const BARE: &'static [&'static str] = &["File", "Flat"];
+}
+
 /// `weight:` of smooth normals.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 #[serde(rename = "Weight")]
@@ -206,4 +219,9 @@ pub(super) enum ShapeEntry<'a> {
     Box {
         size: Option<Raw<'a>>,
     },
+}
+
+impl ShapeEntry<'_> {
+    pub(super) const KINDS: &'static [&'static str] =
+        &["Teapot", "Sphere", "Torus", "Plane", "Box"];
 }

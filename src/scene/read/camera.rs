@@ -16,7 +16,7 @@ pub(super) fn camera(
     extent: &Extent,
 ) -> Result<Camera, SceneError> {
     let field = |raw, name: &str| source.field(raw, format_args!("camera.{name}"));
-    let (axes, planes, projection) = match source.parse(raw)? {
+    let (axes, planes, projection) = match source.parse_kind(raw, CameraEntry::KINDS, &[])? {
         CameraEntry::Perspective {
             position,
             target,

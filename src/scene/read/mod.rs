@@ -199,7 +199,7 @@ fn light<'a>(
     motions: &mut Motions<'a>,
 ) -> Result<Light, SceneError> {
     let field = |raw, name: &str| source.field(raw, format_args!("lights[{index}].{name}"));
-    let (kind, tint, intensity, orbit) = match source.parse(raw)? {
+    let (kind, tint, intensity, orbit) = match source.parse_kind(raw, LightEntry::KINDS, &[])? {
         LightEntry::Point {
             position,
             color,

@@ -176,26 +176,28 @@ impl Meshes {
 
 /// Where the normals of a mesh come from.
 fn normals(source: &Source<'_>, raw: Raw<'_>, at: &str) -> Result<Normals, SceneError> {
-    Ok(match source.parse(raw)? {
-        NormalsEntry::File => Normals::File,
-        NormalsEntry::Flat => Normals::Flat,
-        NormalsEntry::Smooth {
-            crease_degrees,
-            weight,
-        } => Normals::Smooth {
-            crease_degrees: crease_degrees.map_or(Ok(CREASE_DEGREES), |raw| {
-                source
-                    .field(raw, format_args!("{at}.normals.crease_degrees"))
-                    .up_to(180.0)
-            })?,
-            weight: match weight {
-                Some(WeightEntry::Equal) => Weight::Equal,
-                Some(WeightEntry::Area) => Weight::Area,
-                Some(WeightEntry::Angle) => Weight::Angle,
-                None => Weight::default(),
+    Ok(
+        match source.parse_kind(raw, NormalsEntry::WITH_FIELDS, NormalsEntry::BARE)? {
+            NormalsEntry::File => Normals::File,
+            NormalsEntry::Flat => Normals::Flat,
+            NormalsEntry::Smooth {
+                crease_degrees,
+                weight,
+            } => Normals::Smooth {
+                crease_degrees: crease_degrees.map_or(Ok(CREASE_DEGREES), |raw| {
+                    source
+                        .field(raw, format_args!("{at}.normals.crease_degrees"))
+                        .up_to(180.0)
+                })?,
+                weight: match weight {
+                    Some(WeightEntry::Equal) => Weight::Equal,
+                    Some(WeightEntry::Area) => Weight::Area,
+                    Some(WeightEntry::Angle) => Weight::Angle,
+                    None => Weight::default(),
+                },
             },
         },
-    })
+    )
 }
 
 /// A shape, and the factors by which its mesh must be scaled to have the size asked for.
@@ -207,7 +209,7 @@ fn shape<'a>(source: &Source<'a>, raw: Raw<'a>, at: &str) -> Result<(Shape, DVec
     let length = |raw: Option<Raw<'a>>, name, default| {
         raw.map_or(Ok(default), |raw| field(raw, name).length())
     };
-    Ok(match source.parse(raw)? {
+    Ok(match source.parse_kind(raw, ShapeEntry::KINDS, &[])? {
         ShapeEntry::Teapot {
             tessellation,
             bottom,
