@@ -3,8 +3,11 @@
 use super::Failure;
 use clap::Args;
 use specula::BackendKind;
+use specula::frame::{Engine, EngineError, EngineOptions, Method};
 use specula::geometry::screen::MAX_IMAGE_SIDE;
 use specula::output::timing::MAX_DURATION_S;
+use specula::scene::Scene;
+use specula::schedule::Budget;
 use specula::simd::SimdLevel;
 use std::path::Path;
 
@@ -35,6 +38,18 @@ pub(super) struct Machine {
 }
 
 impl Machine {
+    /// An engine for `scene` that uses the machine so.
+    pub(super) fn engine(&self, scene: &Scene, method: Method) -> Result<Engine, EngineError> {
+        let options = EngineOptions {
+            method,
+            backend: self.backend,
+            threads: self.threads,
+            simd: self.simd,
+            ..EngineOptions::default()
+        };
+        Engine::with_options(scene, options)
+    }
+
     /// The number of threads that will be used.
     pub(super) fn thread_count(&self) -> usize {
         self.threads.unwrap_or_else(|| {
@@ -70,6 +85,15 @@ fn size(text: &str) -> Result<Size, String> {
         return Err(format!("an image may have at most {MAX_PIXELS} pixels"));
     }
     Ok(Size { width, height })
+}
+
+/// The budget that `--budget` and `--work` ask for; clap takes one of them at most.
+pub(super) fn budget(ms: Option<f64>, units: Option<u64>) -> Budget {
+    match (ms, units) {
+        (Some(ms), _) => Budget::from_millis(ms),
+        (None, Some(units)) => Budget::Work(units),
+        (None, None) => Budget::Unlimited,
+    }
 }
 
 pub(super) fn milliseconds(text: &str) -> Result<f64, String> {

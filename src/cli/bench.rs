@@ -1,13 +1,12 @@
 //! `specula bench`: frame times over views from all around a scene.
 
 use super::Failure;
-use super::args::{Machine, count, milliseconds, name_of};
+use super::args::{Machine, budget, count, milliseconds, name_of};
 use super::console::{Output, Progress};
 use clap::Args;
 use specula::frame::Method;
 use specula::measure::{BenchOptions, BenchPhase, BenchReport, bench};
 use specula::scene::Scene;
-use specula::schedule::Budget;
 use std::path::PathBuf;
 
 /// Most views, and most times each is rendered: enough for any purpose, and few enough to keep all times.
@@ -82,11 +81,7 @@ pub(super) fn run(args: &Bench) -> Result<(), Failure> {
         width: args.machine.size.width,
         height: args.machine.size.height,
         method: args.method,
-        budget: match (args.budget, args.work) {
-            (Some(ms), _) => Budget::from_millis(ms),
-            (None, Some(units)) => Budget::Work(units),
-            (None, None) => Budget::Unlimited,
-        },
+        budget: budget(args.budget, args.work),
         views: args.views,
         repeats: args.repeat,
         compared_views: args.error,

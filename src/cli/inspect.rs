@@ -1,17 +1,16 @@
 //! `specula inspect`: what a view consists of, in numbers and drawn over the image.
 
-use super::args::{Machine, count, milliseconds, name_of, require_png, time};
+use super::args::{Machine, budget, count, milliseconds, name_of, require_png, time};
 use super::console::{Output, note};
 use super::report::{label, list};
 use super::{Failure, animate};
 use clap::Args;
 use serde_json::{Map, Value, json};
-use specula::frame::{Engine, EngineOptions, FrameStats, Method};
+use specula::frame::{FrameStats, Method};
 use specula::measure::inspection::{Inspection, MaterialCounts};
 use specula::measure::{Layer, draw_overlay};
 use specula::output::{Frame, png};
 use specula::scene::Scene;
-use specula::schedule::Budget;
 use std::path::PathBuf;
 
 /// Most materials that the report on the screen lists.
@@ -98,21 +97,10 @@ pub(super) fn run(args: &Inspect) -> Result<(), Failure> {
     if let Some(seconds) = args.time {
         animate::go_to_time(&mut scene, seconds);
     }
-    let options = EngineOptions {
-        method: args.method,
-        backend: args.machine.backend,
-        threads: args.machine.threads,
-        simd: args.machine.simd,
-        ..EngineOptions::default()
-    };
-    let mut engine = Engine::with_options(&scene, options)?;
+    let mut engine = args.machine.engine(&scene, args.method)?;
     let size = args.machine.size;
     let mut frame = Frame::new(size.width, size.height);
-    let budget = match (args.budget, args.work) {
-        (Some(ms), _) => Budget::from_millis(ms),
-        (None, Some(units)) => Budget::Work(units),
-        (None, None) => Budget::Unlimited,
-    };
+    let budget = budget(args.budget, args.work);
     if args.budget.is_some() {
         engine.warm_up(&scene, size.width, size.height);
     }

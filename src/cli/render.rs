@@ -1,15 +1,14 @@
 //! `specula render`: frames of a still view under a budget.
 
-use super::args::{Machine, count, milliseconds, require_png, time};
+use super::args::{Machine, budget, count, milliseconds, require_png, time};
 use super::console::{Output, Progress, note};
 use super::report::FrameReport;
 use super::{Failure, animate};
 use clap::Args;
-use specula::frame::{Engine, EngineOptions, Method};
+use specula::frame::{Engine, Method};
 use specula::measure::{ErrorReport, ReferenceImage};
 use specula::output::{Frame, png};
 use specula::scene::Scene;
-use specula::schedule::Budget;
 use std::path::PathBuf;
 
 /// `specula render`.
@@ -77,21 +76,10 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
     if let Some(seconds) = args.time {
         animate::go_to_time(&mut scene, seconds);
     }
-    let options = EngineOptions {
-        method: args.method,
-        backend: args.machine.backend,
-        threads: args.machine.threads,
-        simd: args.machine.simd,
-        ..EngineOptions::default()
-    };
     let size = args.machine.size;
-    let mut engine = Engine::with_options(&scene, options)?;
+    let mut engine = args.machine.engine(&scene, args.method)?;
     let mut frame = Frame::new(size.width, size.height);
-    let budget = match (args.budget, args.work) {
-        (Some(ms), _) => Budget::from_millis(ms),
-        (None, Some(units)) => Budget::Work(units),
-        (None, None) => Budget::Unlimited,
-    };
+    let budget = budget(args.budget, args.work);
 
     if args.budget.is_some() {
         engine.warm_up(&scene, size.width, size.height);

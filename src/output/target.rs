@@ -190,6 +190,13 @@ impl<'a> Target<'a> {
         self.stamp
     }
 
+    /// For backends: which of its images the target holds, if `writer` was the last to fill it.
+    #[must_use]
+    pub fn serial_by(&self, writer: u64) -> Option<u64> {
+        let stamp = self.stamp.filter(|stamp| stamp.writer == writer)?;
+        Some(stamp.serial)
+    }
+
     /// For backends: notes that the target now holds the image `stamp`, or one that is not known.
     pub fn mark(&mut self, stamp: Option<Stamp>) {
         self.stamp = stamp;

@@ -142,12 +142,6 @@ impl SkiaBackend {
         }
     }
 
-    /// The serial of the image that `target` holds, if this backend filled it last.
-    fn known_serial(&self, target: &Target<'_>) -> Option<u64> {
-        let stamp = target.stamp().filter(|stamp| stamp.writer == self.writer)?;
-        Some(stamp.serial)
-    }
-
     fn has_size_of(&self, target: &Target<'_>) -> bool {
         (target.width(), target.height()) == (self.width, self.height)
     }
@@ -220,7 +214,7 @@ impl Backend for SkiaBackend {
         if !self.has_size_of(target) {
             return 0;
         }
-        let known = self.known_serial(target);
+        let known = target.serial_by(self.writer);
         stale(&self.tiles, known).map(Tile::pixels).sum()
     }
 
@@ -229,7 +223,7 @@ impl Backend for SkiaBackend {
             return 0;
         }
         let written = self.pending_pixels(target);
-        let known = self.known_serial(target);
+        let known = target.serial_by(self.writer);
         target.mark(Some(Stamp {
             writer: self.writer,
             serial: self.serial,

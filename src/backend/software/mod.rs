@@ -229,7 +229,7 @@ impl Backend for SoftwareBackend {
         if (target.width(), target.height()) != (self.grid.width, self.grid.height) {
             return 0;
         }
-        let known = present::known_serial(self.writer, target);
+        let known = target.serial_by(self.writer);
         present::stale_tiles(&self.tiles, known)
             .map(Tile::pixels)
             .sum()

@@ -19,7 +19,7 @@ pub(super) fn present(
     if (target.width(), target.height()) != (grid.width, grid.height) {
         return 0;
     }
-    let known = known_serial(now.writer, target);
+    let known = target.serial_by(now.writer);
     let written = stale_tiles(tiles, known).map(Tile::pixels).sum();
     target.mark(Some(now));
     if written > 0 {
@@ -43,12 +43,6 @@ pub(super) fn present(
         );
     }
     written
-}
-
-/// The serial of the image that `target` holds, if `writer` filled it last.
-pub(super) fn known_serial(writer: u64, target: &Target<'_>) -> Option<u64> {
-    let stamp = target.stamp().filter(|stamp| stamp.writer == writer)?;
-    Some(stamp.serial)
 }
 
 /// The tiles that a target lacks which holds the image of serial `known`, or an unknown one.

@@ -7,11 +7,12 @@ mod summary;
 pub(super) use args::Animate;
 
 use super::Failure;
+use super::args::budget;
 use super::console::{Output, Progress, note};
 use super::report::frame_json;
 use film::{Destination, Film};
 use serde_json::json;
-use specula::frame::{Engine, EngineOptions, FrameStats};
+use specula::frame::FrameStats;
 use specula::output::sequence::Shard;
 use specula::output::{Frame, Timing};
 use specula::scene::{Animation, Scene};
@@ -133,22 +134,9 @@ impl Job<'_> {
     fn render(&mut self, plan: &[Planned]) -> Result<ControlFlow<()>, Failure> {
         let args = self.args;
         let size = args.machine.size;
-        let budget = match (args.budget, args.work) {
-            (Some(ms), _) => Budget::from_millis(ms),
-            (None, Some(units)) => Budget::Work(units),
-            (None, None) => Budget::Unlimited,
-        };
+        let budget = budget(args.budget, args.work);
         // Made from the scene at rest, whichever frame is the first, so that all parts of a film start from the same.
-        let mut engine = Engine::with_options(
-            &self.scene,
-            EngineOptions {
-                method: args.method,
-                backend: args.machine.backend,
-                threads: args.machine.threads,
-                simd: args.machine.simd,
-                ..EngineOptions::default()
-            },
-        )?;
+        let mut engine = args.machine.engine(&self.scene, args.method)?;
         let mut frame = Frame::new(size.width, size.height);
         if args.budget.is_some() {
             engine.warm_up(&self.scene, size.width, size.height);
