@@ -13,7 +13,8 @@ pub enum Outcome {
     Refined,
     /// There was time for the first image only; if even that took longer than the budget, the frame is late.
     BaseOnly,
-    /// Nothing was drawn: the image was final already, or there was no time at all.
+    /// Nothing was drawn: the image was final already, or there was no time; on a backend that draws everything once, also
+    /// if a better image would take longer to draw than the budget.
     Unchanged,
 }
 

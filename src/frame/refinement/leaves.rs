@@ -40,8 +40,7 @@ pub struct Leaf {
     pub level: u32,
     /// How it is coloured.
     pub kind: LeafKind,
-    /// Whether the image shows it already. Not known, and true, on a backend that draws everything once: it may have
-    /// been refined in a frame that had no time left to draw.
+    /// Whether the image shows it already; always true on a backend that draws everything once.
     pub is_painted: bool,
     /// Whether its triangle passes the paper's test for some light. False with methods that do not test.
     pub is_pht: bool,
