@@ -114,7 +114,9 @@ fn bench_prints_what_scripts_rely_on() {
     for key in keys.split_whitespace() {
         assert!(!report[key].is_null(), "`{key}` in {report}");
     }
-    for stage in ["cull", "shade", "classify", "raster", "refine", "resolve"] {
+    for stage in [
+        "cull", "shade", "classify", "raster", "refine", "resolve", "present",
+    ] {
         assert!(
             report["stage_ms"][stage].is_number(),
             "`{stage}` in {report}"

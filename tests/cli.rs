@@ -331,7 +331,9 @@ fn render_prints_one_json_object_per_frame() {
         );
         assert_keys(
             &frame["stage_ms"],
-            &["cull", "shade", "classify", "raster", "refine", "resolve"],
+            &[
+                "cull", "shade", "classify", "raster", "refine", "resolve", "present",
+            ],
         );
         assert_eq!(frame["frame"], number);
         assert_eq!(frame["budget_ms"], 2.0);

@@ -3,6 +3,7 @@
 use super::Failure;
 use super::args::{Machine, budget, count, milliseconds, name_of};
 use super::console::{Output, Progress};
+use super::report::list;
 use clap::Args;
 use specula::frame::Method;
 use specula::measure::{BenchOptions, BenchPhase, BenchReport, bench};
@@ -119,7 +120,6 @@ pub(super) fn run(args: &Bench) -> Result<(), Failure> {
 /// A block of lines.
 fn text(report: &BenchReport) -> String {
     let r = report;
-    let stages = &r.stage_ms;
     let mut lines = vec![
         format!(
             "{}: {}, {}x{}, {} threads, {} views, {} lights, {} triangles",
@@ -130,13 +130,12 @@ fn text(report: &BenchReport) -> String {
             r.frame_ms_min, r.frame_ms_median, r.frame_ms_mean, r.frame_ms_p99, r.frame_ms_max
         ),
         format!(
-            "  stages     cull {:.3}, shade {:.3}, classify {:.3}, raster {:.3}, refine {:.3}, resolve {:.3} ms (means)",
-            stages.cull,
-            stages.shade,
-            stages.classify,
-            stages.raster,
-            stages.refine,
-            stages.resolve
+            "  stages     {} ms (means)",
+            list(
+                r.stage_ms
+                    .entries()
+                    .map(|(name, ms)| format!("{name} {ms:.3}"))
+            )
         ),
         format!(
             "  triangles  {:.1} drawn, {:.1} visible, {:.1} subdivided (means)",

@@ -1,7 +1,7 @@
 //! What is said of a frame, on the screen and to other programs.
 
 use serde_json::{Map, Value, json};
-use specula::frame::{FrameStats, StageTimes};
+use specula::frame::FrameStats;
 use specula::measure::ErrorReport;
 use specula::schedule::Budget;
 
@@ -30,7 +30,7 @@ pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
         Budget::Work(units) => (None, Some(units)),
         Budget::Unlimited => (None, None),
     };
-    let stages: Map<String, Value> = stages(&stats.stage_ms)
+    let stages: Map<String, Value> = (stats.stage_ms.entries())
         .into_iter()
         .map(|(name, ms)| (name.to_owned(), json!(ms)))
         .collect();
@@ -82,7 +82,12 @@ impl FrameReport {
             self.headline(),
             format!(
                 "  stages     {}",
-                list(stages(&stats.stage_ms).map(|(name, ms)| format!("{name} {ms:.2}"))) + " ms"
+                list(
+                    stats
+                        .stage_ms
+                        .entries()
+                        .map(|(name, ms)| format!("{name} {ms:.2}"))
+                ) + " ms"
             ),
             format!(
                 "  triangles  {} in the scene, {} drawn, {} visible, {} subdivided; {} leaves open",
@@ -150,26 +155,6 @@ impl FrameReport {
             text
         }
     }
-}
-
-/// Names and milliseconds of the stages.
-fn stages(stages: &StageTimes) -> [(&'static str, f64); 6] {
-    let StageTimes {
-        cull,
-        shade,
-        classify,
-        raster,
-        refine,
-        resolve,
-    } = *stages;
-    [
-        ("cull", cull),
-        ("shade", shade),
-        ("classify", classify),
-        ("raster", raster),
-        ("refine", refine),
-        ("resolve", resolve),
-    ]
 }
 
 /// The line about a comparison with the reference.

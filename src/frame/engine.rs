@@ -260,7 +260,7 @@ impl Renderer {
         self.handed_over.truncate(MOST_AGE - 1);
         self.handed_over.push_front(target.stamp());
         let frame_ms = allowance.elapsed_ms();
-        stages.resolve += frame_ms - presenting_since;
+        stages.present += frame_ms - presenting_since;
         self.presenting
             .learn(pixels_written, frame_ms - presenting_since);
 

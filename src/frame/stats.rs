@@ -1,6 +1,7 @@
 //! What happened in a frame.
 
 use crate::schedule::Budget;
+use serde::Serialize;
 use std::fmt;
 
 /// How far a frame came.
@@ -38,7 +39,7 @@ impl fmt::Display for Outcome {
 }
 
 /// Milliseconds spent in each stage of a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StageTimes {
     /// Taking over what has changed of the scene, and culling clusters.
     pub cull: f64,
@@ -50,8 +51,37 @@ pub struct StageTimes {
     pub raster: f64,
     /// Subdividing, illuminating new vertices, repainting and per-pixel shading.
     pub refine: f64,
-    /// Colouring the first image, and bringing the caller's frame up to date.
+    /// Colouring the first image.
     pub resolve: f64,
+    /// Bringing the caller's frame up to date.
+    pub present: f64,
+}
+
+impl StageTimes {
+    /// Names and milliseconds, in the order of the fields, for reports.
+    #[must_use]
+    pub fn entries(&self) -> [(&'static str, f64); 7] {
+        [
+            ("cull", self.cull),
+            ("shade", self.shade),
+            ("classify", self.classify),
+            ("raster", self.raster),
+            ("refine", self.refine),
+            ("resolve", self.resolve),
+            ("present", self.present),
+        ]
+    }
+
+    /// Adds another frame's times, weighted.
+    pub(crate) fn add_scaled(&mut self, other: &Self, weight: f64) {
+        self.cull += other.cull * weight;
+        self.shade += other.shade * weight;
+        self.classify += other.classify * weight;
+        self.raster += other.raster * weight;
+        self.refine += other.refine * weight;
+        self.resolve += other.resolve * weight;
+        self.present += other.present * weight;
+    }
 }
 
 /// What a frame did not need to do.

@@ -17,7 +17,7 @@ use super::metrics::ErrorHistogram;
 use super::reference::ReferenceImage;
 use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
-use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
+use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method, StageTimes};
 use crate::output::Frame;
 use crate::scene::{Camera, Scene};
 use crate::schedule::Budget;
@@ -137,7 +137,7 @@ pub struct BenchReport {
     /// Longest frame.
     pub frame_ms_max: f64,
     /// Mean milliseconds by stage.
-    pub stage_ms: StageMeans,
+    pub stage_ms: StageTimes,
     /// Frames that ended after their deadline; `None` without a wall-clock budget, as are the overshoots.
     pub late_frames: Option<u64>,
     /// Median milliseconds past the deadline, negative when early.
@@ -166,18 +166,6 @@ pub struct BenchReport {
     pub rmse: Option<f64>,
     /// The same in decibels; `None` also where there is no error.
     pub psnr_db: Option<f64>,
-}
-
-/// Mean milliseconds by stage; see [`StageTimes`](crate::frame::StageTimes).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "named like the stages")]
-pub struct StageMeans {
-    pub cull: f64,
-    pub shade: f64,
-    pub classify: f64,
-    pub raster: f64,
-    pub refine: f64,
-    pub resolve: f64,
 }
 
 /// Renders `scene`, which the report calls `name`, from all around. `on_frame` is told of every frame finished.
@@ -298,7 +286,7 @@ impl Turntable {
 #[derive(Debug, Default)]
 struct Totals {
     frame_ms: Vec<f64>,
-    stage_ms: StageMeans,
+    stage_ms: StageTimes,
     converged: u64,
     triangles_drawn: u64,
     triangles_visible: u64,
@@ -310,13 +298,7 @@ struct Totals {
 impl Totals {
     fn add(&mut self, stats: &FrameStats) {
         self.frame_ms.push(stats.frame_ms);
-        let (sum, stages) = (&mut self.stage_ms, &stats.stage_ms);
-        sum.cull += stages.cull;
-        sum.shade += stages.shade;
-        sum.classify += stages.classify;
-        sum.raster += stages.raster;
-        sum.refine += stages.refine;
-        sum.resolve += stages.resolve;
+        self.stage_ms.add_scaled(&stats.stage_ms, 1.0);
         self.converged += u64::from(stats.converged);
         self.triangles_drawn += stats.triangles_drawn;
         self.triangles_visible += stats.triangles_visible;
@@ -337,7 +319,8 @@ impl Totals {
             Budget::Unlimited => (None, None),
         };
         let overshoot = |percent| budget_ms.map(|budget| quantile(times, percent) - budget);
-        let stages = &self.stage_ms;
+        let mut stage_ms = StageTimes::default();
+        stage_ms.add_scaled(&self.stage_ms, share);
         BenchReport {
             scene: String::new(),
             method: options.method.name(),
@@ -355,14 +338,7 @@ impl Totals {
             frame_ms_mean: times.iter().sum::<f64>() * share,
             frame_ms_p99: quantile(times, 99),
             frame_ms_max: quantile(times, 100),
-            stage_ms: StageMeans {
-                cull: stages.cull * share,
-                shade: stages.shade * share,
-                classify: stages.classify * share,
-                raster: stages.raster * share,
-                refine: stages.refine * share,
-                resolve: stages.resolve * share,
-            },
+            stage_ms,
             late_frames: budget_ms
                 .map(|budget| times.iter().filter(|&&ms| ms > budget).count() as u64),
             overshoot_ms_median: overshoot(50),

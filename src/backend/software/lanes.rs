@@ -8,7 +8,7 @@
 use crate::geometry::Vec3s;
 use crate::geometry::screen::Interpolator;
 use crate::simd::Simd;
-use fearless_simd::{Select, SimdBase, SimdFloat, SimdInt};
+use fearless_simd::{Select, SimdBase, SimdFloat, SimdMask};
 
 /// Sums of edge planes below this count as zero.
 const LEAST_SUM: f32 = 1e-30;
@@ -49,15 +49,6 @@ pub(super) fn select3<S: Simd>(mask: S::mask32s, a: Lanes3<S>, b: Lanes3<S>) -> 
     ]
 }
 
-/// The weights of a triangle's corners at consecutive pixels of a row, the first of them being `(x, y)` of the image.
-#[inline(always)]
-pub(super) fn weights<S: Simd>(simd: S, planes: &Interpolator, x: i32, y: i32) -> Lanes3<S> {
-    let iota = S::i32s::from_fn(simd, |i| i as i32);
-    let dx = (iota + (x - planes.anchor[0])).to_float();
-    let dy = S::f32s::splat(simd, (y - planes.anchor[1]) as f32);
-    weights_at(simd, planes, dx, dy)
-}
-
 /// The weights of a triangle's corners at any pixels, given as whole numbers of pixels to the right of the anchor and down.
 #[inline(always)]
 pub(super) fn weights_at<S: Simd>(
@@ -70,19 +61,18 @@ pub(super) fn weights_at<S: Simd>(
     let mut e = [zero; 3];
     for (i, e) in e.iter_mut().enumerate() {
         let [a, b, c] = splat3(simd, [planes.a[i], planes.b[i], planes.c[i]]);
-        let value = a.mul_add(dx, b.mul_add(dy, c));
-        // False for what is not a number.
-        *e = value.simd_gt(zero).select(value, zero);
+        // What is not a number becomes zero, or else makes the sum none.
+        *e = a.mul_add(dx, b.mul_add(dy, c)).max(zero);
     }
     let sum = e[0] + e[1] + e[2];
     let usable = sum.simd_gt(S::f32s::splat(simd, LEAST_SUM));
     let scale = S::f32s::splat(simd, 1.0) / sum;
+    let weights = [e[0] * scale, e[1] * scale, e[2] * scale];
+    if usable.all_true() {
+        return weights;
+    }
     let third = S::f32s::splat(simd, 1.0 / 3.0);
-    [
-        usable.select(e[0] * scale, third),
-        usable.select(e[1] * scale, third),
-        usable.select(e[2] * scale, third),
-    ]
+    select3::<S>(usable, weights, [third; 3])
 }
 
 /// The corners' values weighted.
@@ -104,7 +94,9 @@ mod tests {
 
     #[inline(always)]
     fn weights_at<S: Simd>(simd: S, planes: &Interpolator, x: i32, y: i32) -> Vec<[f32; 3]> {
-        let w = weights(simd, planes, x, y);
+        let dx = S::f32s::from_fn(simd, |i| (x + i as i32 - planes.anchor[0]) as f32);
+        let dy = S::f32s::splat(simd, (y - planes.anchor[1]) as f32);
+        let w = super::weights_at(simd, planes, dx, dy);
         (0..S::f32s::LEN)
             .map(|i| [w[0].as_slice()[i], w[1].as_slice()[i], w[2].as_slice()[i]])
             .collect()

@@ -5,9 +5,9 @@
 //! | pass | over | does |
 //! |---|---|---|
 //! | `transform` | blocks of vertices | pixel space, clipping planes, sub-pixel grid |
-//! | `setup` | `shares` of triangles | culls, clips, plans depth, sorts into tiles |
-//! | `raster` | tiles | coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them |
-//! | `visible` | tiles, then visible triangles | counts owners' pixels, prepares their barycentric planes |
+//! | `setup`, `planes` | `shares` of triangles | culls, clips, works out planes, sorts into tiles |
+//! | `raster` | tiles | coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them; counts owners' pixels |
+//! | `visible` | shares | lists the owners |
 //! | `resolve` | tiles | colours |
 //! | `repaint` | tiles | colours of parts of triangles |
 //! | `present` | bands of tiles | copies changed tiles to a frame |
@@ -18,6 +18,7 @@
 mod fill;
 mod lanes;
 mod patch;
+mod planes;
 mod present;
 mod raster;
 mod repaint;
@@ -40,7 +41,7 @@ use repaint::Job;
 use resolve::Painter;
 use shares::Shares;
 use std::fmt;
-use tile::{Grid, TILE_SIDE, Tile};
+use tile::{Grid, TILE_SIDE, Tile, pixel_index};
 use transform::Vertices;
 use visible::Visible;
 
@@ -103,26 +104,32 @@ impl SoftwareBackend {
 
     /// The owner of every pixel, row after row, [`NO_TRIANGLE`] where there is none; `out` is overwritten.
     pub fn ids(&self, out: &mut Vec<u32>) {
-        self.copy_rows(|tile| &tile.id, out);
+        out.clear();
+        out.extend(self.slots().map(|(slot, _)| match slot {
+            NO_TRIANGLE => NO_TRIANGLE,
+            slot => self.shares.drawn(slot).id,
+        }));
     }
 
     /// The reversed depth of every pixel, row after row, 0 where nothing is; `out` is overwritten.
     pub fn depths(&self, out: &mut Vec<f32>) {
-        self.copy_rows(|tile| &tile.depth, out);
-        for depth in out {
-            *depth = depth.max(0.0);
-        }
+        out.clear();
+        out.extend(self.slots().map(|(slot, [x, y])| match slot {
+            NO_TRIANGLE => 0.0,
+            slot => self.shares.depth(slot).at_pixel(x, y),
+        }));
     }
 
-    fn copy_rows<T: Copy>(&self, plane: impl Fn(&Tile) -> &[T], out: &mut Vec<T>) {
-        out.clear();
-        for y in 0..self.grid.height as usize {
-            let first = y / TILE_SIDE * self.grid.columns;
-            for tile in &self.tiles[first..first + self.grid.columns] {
-                let start = y % TILE_SIDE * TILE_SIDE;
-                out.extend_from_slice(&plane(tile)[start..start + tile.width as usize]);
-            }
-        }
+    /// Slots and places of all pixels, row after row.
+    fn slots(&self) -> impl Iterator<Item = (u32, [i32; 2])> {
+        let grid = self.grid;
+        (0..grid.height as usize).flat_map(move |y| {
+            (0..grid.width as usize).map(move |x| {
+                let tile = &self.tiles[y / TILE_SIDE * grid.columns + x / TILE_SIDE];
+                let slot = tile.slot[pixel_index(x % TILE_SIDE, y % TILE_SIDE)];
+                (slot, [x as i32, y as i32])
+            })
+        })
     }
 
     /// Makes room for a view's image.
@@ -169,15 +176,14 @@ impl Backend for SoftwareBackend {
             .transform(exec, geometry, self.shares.used_mut());
         let vertices = &self.vertices;
         exec.for_each_chunk(self.shares.used_mut(), 1, |_, share| {
-            setup::set_up(&mut share[0], geometry, grid, vertices);
+            dispatch!(exec.level, simd => setup::set_up(simd, &mut share[0], geometry, grid, vertices));
         });
         let shares = self.shares.used();
         exec.for_each_chunk(&mut self.tiles, 1, |index, tile| {
             dispatch!(exec.level, simd => raster::draw_tile(simd, &mut tile[0], index, shares));
         });
-        self.visible.clear(geometry.world.triangles.len());
-        self.visible.count(&self.tiles);
-        self.visible.prepare(exec, geometry, grid, vertices);
+        self.visible
+            .list(exec, &mut self.shares, geometry.world.triangles.len());
         self.counts()
     }
 
@@ -186,14 +192,14 @@ impl Backend for SoftwareBackend {
     }
 
     fn visible_pixels(&self, triangle: u32) -> u32 {
-        self.visible.pixels(triangle)
+        self.visible.pixels(&self.shares, triangle)
     }
 
     fn resolve(&mut self, exec: Exec, geometry: Geometry<'_>, paint: BasePaint<'_>) {
         self.serial += 1;
         let painter = Painter {
             geometry,
-            visible: &self.visible,
+            shares: &self.shares,
             serial: self.serial,
         };
         exec.for_each_chunk(&mut self.tiles, 1, |_, tile| {
@@ -205,13 +211,14 @@ impl Backend for SoftwareBackend {
         self.serial += 1;
         let painter = Painter {
             geometry,
-            visible: &self.visible,
+            shares: &self.shares,
             serial: self.serial,
         };
         repaint::plan(
             exec,
             &mut self.jobs,
             &painter,
+            &self.visible,
             self.grid,
             &self.vertices,
             patches,

@@ -12,14 +12,14 @@
 //! wraps, is exact whenever the result fits, bias of the top-left rule included.
 //!
 //! **Where to look.** The coordinates that a pixel is found to have are off by the triangle's
-//! [`slack`](super::visible::VisibleTriangle::slack) at most. So the pixels of a patch lie in the box of its projection,
+//! [`slack`] at most. So the pixels of a patch lie in the box of its projection,
 //! widened by that, and where each edge function is at least minus what the slack can change it by. Times the sum of the
 //! root's edge planes, which is positive, an edge function is linear in the pixel: it bounds each row of pixels on the left or on
 //! the right. Where the slack says nothing, all that the triangle may own is searched.
 
 use super::lanes::Lanes3;
-use super::tile::{Bounds, TILE_SIDE, Tile, TileBox};
-use super::visible::VisibleTriangle;
+use super::setup::Drawn;
+use super::tile::{BLOCK_SIDE, Bounds, TILE_SIDE, TileBox};
 use crate::geometry::Bary;
 use crate::geometry::screen::Interpolator;
 use crate::math::PixelPoint;
@@ -42,15 +42,15 @@ const MARGIN: f32 = 1.0 / 64.0;
 /// the root; likewise along y.
 #[inline(always)]
 pub(super) fn patch_bounds(
-    owner: &VisibleTriangle,
-    corners: impl FnOnce() -> [PixelPoint; 3],
+    owner: &Drawn,
+    slack: f32,
+    [a, b, c]: &[PixelPoint; 3],
     patch: &[Bary; 3],
 ) -> Option<Bounds> {
-    if *patch == Bary::ROOT || owner.slack == f32::INFINITY {
+    if *patch == Bary::ROOT || slack == f32::INFINITY {
         return Some(owner.bounds);
     }
-    let [a, b, c] = corners();
-    let slack = f64::from(owner.slack);
+    let slack = f64::from(slack);
     let w_room = slack * ((b[3] - a[3]).abs() + (c[3] - a[3]).abs());
     let mut min = [f64::INFINITY; 2];
     let mut max = [f64::NEG_INFINITY; 2];
@@ -86,6 +86,52 @@ pub(super) fn patch_bounds(
         y1: owner.bounds.y1.min(ends[1] - 1),
     };
     (bounds.x0 <= bounds.x1 && bounds.y0 <= bounds.y1).then_some(bounds)
+}
+
+/// A bound of the error of a pixel's barycentric coordinates: how far, in barycentric coordinates, those that a pixel is found
+/// to have can be from those of a point that projects to its centre. For a triangle in front of the eye; infinite for a clipped one,
+/// and when nothing better is known.
+///
+/// With `s` the smallest sum of the edge planes over the triangle (it is linear, so at a corner), `M` the largest magnitude in
+/// evaluating one inside the box, and `G` the largest slope per pixel:
+/// * rounding coefficients and operations to `f32` costs at most `8 * 2^-24 M` per plane, four times that over `s` per weight;
+/// * snapping brings in pixels up to `2^-9` outside along each axis, and clamping moves them back: `4 * 2^-9 G / s`, taken twice;
+/// * rounding to the grid of the pixels' coordinates and clamping to its inside costs at most `2.5 * 2^-16`, taken as `2^-14`.
+///
+/// Above a quarter the bound is not worth having, and `s` itself may be nothing but rounding: infinity.
+pub(super) fn slack(owner: &Drawn, corners: &[PixelPoint; 3]) -> f32 {
+    if owner.is_clipped {
+        return f32::INFINITY;
+    }
+    let (planes, bounds) = (owner.interpolator(), &owner.bounds);
+    let sum_at = |x: f64, y: f64| -> f64 {
+        let dx = x - 0.5 - f64::from(planes.anchor[0]);
+        let dy = y - 0.5 - f64::from(planes.anchor[1]);
+        (0..3)
+            .map(|i| {
+                let [a, b, c] = [planes.a[i], planes.b[i], planes.c[i]].map(f64::from);
+                a * dx + b * dy + c
+            })
+            .sum()
+    };
+    let smallest_sum = corners
+        .iter()
+        .map(|[x, y, _, w]| sum_at(x / w, y / w))
+        .fold(f64::INFINITY, f64::min);
+    let extent = [bounds.x1 - bounds.x0, bounds.y1 - bounds.y0].map(f64::from);
+    let (mut largest, mut slope) = (0.0, 0.0);
+    for i in 0..3 {
+        let [a, b, c] = [planes.a[i], planes.b[i], planes.c[i]].map(|v| f64::from(v.abs()));
+        largest = f64::max(largest, a * extent[0] + b * extent[1] + c);
+        slope = f64::max(slope, a + b);
+    }
+    let bound = 1.0 / 16384.0 + (largest / f64::from(1 << 19) + slope / 64.0) / smallest_sum;
+    // Not so for NaN either.
+    if smallest_sum > 0.0 && bound < 0.25 {
+        bound as f32
+    } else {
+        f32::INFINITY
+    }
 }
 
 /// The edges of a patch as `a b1 + b b2 + c >= 0` on the grid of pixels' barycentric coordinates, the top-left rule
@@ -192,16 +238,16 @@ impl Rows {
     pub(super) fn find<S: Simd>(
         &mut self,
         simd: S,
-        tile: &Tile,
+        origin: [i32; 2],
         pixels: TileBox,
-        owner: &VisibleTriangle,
+        planes: &Interpolator,
+        slack: f32,
         edges: Option<&PatchEdges>,
     ) {
-        let slack = f64::from(owner.slack);
         let mut lines = [None; 3];
-        if let Some(edges) = edges.filter(|_| owner.slack < f32::INFINITY) {
+        if let Some(edges) = edges.filter(|_| slack < f32::INFINITY) {
             for (index, line) in lines.iter_mut().enumerate() {
-                *line = edges.line(index, &owner.planes, slack, tile.origin);
+                *line = edges.line(index, planes, f64::from(slack), origin);
             }
         }
         let lanes = S::i32s::LEN;
@@ -226,5 +272,34 @@ impl Rows {
             first.store_slice(&mut self.first[at..at + lanes]);
             last.store_slice(&mut self.last[at..at + lanes]);
         }
+    }
+
+    /// The blocks across in which a row of blocks has pixels of rows `y0..=y1`, as the first and the one behind the last.
+    #[inline(always)]
+    pub(super) fn blocks(&self, y0: usize, y1: usize) -> [usize; 2] {
+        let (mut first, mut end) = (TILE_SIDE as i32, 0);
+        for y in y0..=y1 {
+            if self.first[y] <= self.last[y] {
+                first = first.min(self.first[y]);
+                end = end.max(self.last[y] + 1);
+            }
+        }
+        [
+            first as usize / BLOCK_SIDE,
+            (end as usize).div_ceil(BLOCK_SIDE),
+        ]
+    }
+
+    /// Which pixels of a block, whose corner is at `(x, y)`, lie in the rows `y0..=y1` and in the columns found; one bit each.
+    #[inline(always)]
+    pub(super) fn within_block(&self, [x, y]: [i32; 2], y0: usize, y1: usize) -> u32 {
+        let side = BLOCK_SIDE as i32;
+        let mut bits = 0;
+        for row in y0..=y1 {
+            let first = (self.first[row] - x).clamp(0, side);
+            let end = (self.last[row] + 1 - x).clamp(first, side);
+            bits |= ((1 << end) - (1 << first)) << (side * (row as i32 - y));
+        }
+        bits
     }
 }

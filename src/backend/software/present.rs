@@ -3,7 +3,7 @@
 //! A target says which writer filled it and when. Every tile knows when it changed last; so a target of ours lacks
 //! exactly the tiles that changed after its stamp, and any other target lacks all.
 
-use super::tile::{Grid, TILE_SIDE, Tile};
+use super::tile::{BLOCK_PIXELS, BLOCK_SIDE, Grid, TILE_SIDE, Tile, pixel_index};
 use crate::output::target::PIXEL_BYTES;
 use crate::output::{ChannelOrder, Stamp, Target};
 use crate::parallel::Exec;
@@ -57,14 +57,20 @@ pub(super) fn stale_tiles(tiles: &[Tile], known: Option<u64>) -> impl Iterator<I
 fn copy_tile(tile: &Tile, stride: usize, band: &mut [u8], bytes_of: impl Fn(u32) -> [u8; 4]) {
     let left = tile.origin[0] as usize * PIXEL_BYTES;
     let width = tile.width as usize * PIXEL_BYTES;
-    for (row, colours) in band
+    for (y, row) in band
         .chunks_mut(stride)
-        .zip(tile.colour.chunks(TILE_SIDE))
+        .enumerate()
         .take(tile.height as usize)
     {
-        let (pixels, _) = row[left..left + width].as_chunks_mut::<PIXEL_BYTES>();
-        for (pixel, &colour) in pixels.iter_mut().zip(colours) {
-            *pixel = bytes_of(colour);
+        // The same row of each block; blocks follow each other.
+        let first = pixel_index(0, y);
+        let blocks = tile.colour[first..].chunks(BLOCK_PIXELS);
+        let pieces = row[left..left + width].chunks_mut(BLOCK_SIDE * PIXEL_BYTES);
+        for (piece, block) in pieces.zip(blocks) {
+            let (pixels, _) = piece.as_chunks_mut::<PIXEL_BYTES>();
+            for (pixel, &colour) in pixels.iter_mut().zip(block) {
+                *pixel = bytes_of(colour);
+            }
         }
     }
 }

@@ -1,187 +1,378 @@
 //! Coverage and depth of one tile, in lanes.
 //!
 //! Edge functions are exact. An edge value `E` changes by a multiple of 256 sub-pixel units from pixel to pixel, so
-//! `E >= 0` exactly where `E >> 8 >= 0` (the shift rounds down): `E` is found once per triangle and tile in `i64`, shifted, and goes
+//! `E >= 0` exactly where `E >> 8 >= 0` (the shift rounds down): `E` is found once per piece and tile in `i64`, shifted, and goes
 //! on in `i32`. The step per pixel is then the edge's extent in sub-pixels, below `2^23` along each axis by the guard band. An edge
-//! that no pixel of the box (widened to whole vectors) violates is left out; if every pixel violates one, so is the
-//! triangle. Any other changes its sign within 64 x 64 pixels, hence is nowhere larger than `63 * 2^24 < 2^30`: `i32` does not
-//! overflow.
+//! that no pixel of the blocks in question violates is left out; if every pixel violates one, so are the blocks. Any other changes
+//! its sign within 64 x 64 pixels, hence is nowhere larger than `63 * 2^24 < 2^30`: `i32` does not overflow.
 //!
-//! Depth is [`DepthPlane::at_pixel`](crate::geometry::screen::DepthPlane::at_pixel): products and sums rounded one by one, never fused.
-//! Triangles come in ascending order of ids, so "strictly nearer wins" leaves the smaller id in front at equal depth.
+//! A piece that touches more than 4 x 4 blocks goes through **squares** of 16 x 16 pixels. Each is rejected, or entered with
+//! those edges only that cross it. A square also knows a depth that none of its pixels is farther than: a piece that nowhere comes
+//! nearer does not enter it. That depth rises when a piece covers the square without a gap, which is what large occluders do.
+//!
+//! Depth is [`DepthPlane::at_pixel`]: products and sums rounded one by one, never fused.
+//! Pieces come in ascending order of slots, hence of ids, so "strictly nearer wins" leaves the smaller id in front at equal depth.
 
-use super::setup::Prepared;
-use super::shares::Share;
-use super::tile::{NO_TRIANGLE, Run, TILE_PIXELS, TILE_SIDE, Tile, TileBox};
-use crate::geometry::screen::{EdgeFunction, SUBPIXEL_BITS};
+use super::setup::Piece;
+use super::shares::{Share, add_pixels};
+use super::tile::{
+    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, NO_DEPTH, NO_TRIANGLE, TILE_PIXELS, TILE_SIDE, Tile,
+};
+use crate::geometry::screen::{DepthPlane, EdgeFunction, SUBPIXEL_BITS};
 use crate::simd::Simd;
 use fearless_simd::{Select, SimdBase, SimdInt, SimdMask};
 
-/// Draws a tile's triangles and notes who owns how many pixels.
+/// Blocks side by side in a square.
+const SQUARE_BLOCKS: usize = 4;
+/// Squares side by side in a tile.
+const SQUARES_ACROSS: usize = BLOCKS_ACROSS / SQUARE_BLOCKS;
+
+/// Three edges, and the right and the lower border of the image.
+const MOST_EDGES: usize = 5;
+
+/// Most vectors in a block: at four lanes.
+const MOST_PARTS: usize = 4;
+
+/// Draws a tile's triangles and counts the pixels of each.
 #[inline(always)]
 pub(super) fn draw_tile<S: Simd>(simd: S, tile: &mut Tile, index: usize, shares: &[Share]) {
-    let mut triangles = shares.iter().flat_map(|share| share.bin(index)).peekable();
-    if triangles.peek().is_some() {
-        tile.clear();
-        for prepared in triangles {
-            draw_triangle(simd, tile, prepared);
+    tile.clear();
+    let mut pieces = shares.iter().flat_map(|share| share.bin(index)).peekable();
+    if pieces.peek().is_none() {
+        return;
+    }
+    let mut canvas = Canvas {
+        depth: [NO_DEPTH; TILE_PIXELS],
+        farthest: [NO_DEPTH; SQUARES_ACROSS * SQUARES_ACROSS],
+        lanes: Lanes::new(simd),
+        tile,
+    };
+    for piece in pieces {
+        canvas.draw(simd, piece);
+    }
+    count_owners(simd, tile, shares);
+}
+
+/// Columns and rows of a block's pixels, from its corner, a vector for each part of the block.
+#[derive(Clone, Copy)]
+struct Lanes<S: Simd> {
+    column: [S::i32s; MOST_PARTS],
+    row: [S::i32s; MOST_PARTS],
+}
+
+impl<S: Simd> Lanes<S> {
+    /// Vectors of a block.
+    #[inline(always)]
+    fn parts() -> usize {
+        BLOCK_PIXELS / S::i32s::LEN
+    }
+
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        let iota = S::i32s::from_fn(simd, |i| i as i32);
+        let mut lanes = Self {
+            column: [iota; MOST_PARTS],
+            row: [iota; MOST_PARTS],
+        };
+        for part in 0..Self::parts() {
+            let pixel = iota + (part * S::i32s::LEN) as i32;
+            lanes.column[part] = pixel & (BLOCK_SIDE as i32 - 1);
+            lanes.row[part] = pixel >> BLOCK_SIDE.trailing_zeros();
         }
-        collect_runs(simd, tile);
-    } else if tile.covered > 0 {
-        tile.clear();
-        tile.runs.clear();
-        tile.covered = 0;
+        lanes
     }
 }
 
-/// One edge of a triangle inside a tile, in whole pixels.
+/// A rectangle of blocks, inclusive.
+#[derive(Clone, Copy)]
+struct BlockRange {
+    x0: usize,
+    y0: usize,
+    x1: usize,
+    y1: usize,
+}
+
+/// One edge of a piece inside a tile, in whole pixels.
 #[derive(Clone, Copy, Default)]
 struct TileEdge {
-    /// Value at the first pixel of the (widened) box.
-    start: i32,
+    /// Value at the tile's first pixel; may be outside of `i32`.
+    origin: i64,
     /// Change per pixel to the right.
     dx: i32,
     /// Change per pixel down.
     dy: i32,
 }
 
-#[inline(always)]
-fn draw_triangle<S: Simd>(simd: S, tile: &mut Tile, prepared: &Prepared) {
-    let pixels = prepared.bounds.within(tile.origin);
-    let lanes = S::f32s::LEN as i32;
-    let first = pixels.x0 & !(lanes - 1);
-    let last = pixels.x1 | (lanes - 1);
-    let mut edges = [TileEdge::default(); 4];
-    let mut count = 0;
-    for i in 0..3 {
-        let edge = EdgeFunction::new(prepared.corners[i], prepared.corners[(i + 1) % 3]);
-        let start = edge.at_pixel(tile.origin[0] + first, tile.origin[1] + pixels.y0);
-        let start = start >> SUBPIXEL_BITS;
-        let across = edge.a * i64::from(last - first);
-        let down = edge.b * i64::from(pixels.y1 - pixels.y0);
-        if start + across.max(0) + down.max(0) < 0 {
-            return;
-        }
-        if start + across.min(0) + down.min(0) < 0 {
-            edges[count] = TileEdge {
-                start: start as i32,
+/// Edges, of which the first `count` are meant.
+#[derive(Clone, Copy)]
+struct Edges {
+    edges: [TileEdge; MOST_EDGES],
+    count: usize,
+}
+
+impl Edges {
+    /// Those of a piece.
+    #[inline(always)]
+    fn of_piece(piece: &Piece, tile: &Tile) -> Self {
+        let mut edges = [TileEdge::default(); MOST_EDGES];
+        for i in 0..3 {
+            let edge = EdgeFunction::new(piece.corners[i], piece.corners[(i + 1) % 3]);
+            edges[i] = TileEdge {
+                origin: edge.at_pixel(tile.origin[0], tile.origin[1]) >> SUBPIXEL_BITS,
                 dx: edge.a as i32,
                 dy: edge.b as i32,
             };
-            count += 1;
         }
-    }
-    if last >= tile.width {
-        // The right border of the image, which would not stop a vector.
-        edges[count] = TileEdge {
-            start: tile.width - 1 - first,
+        // The borders of the image, which would not stop a block.
+        edges[3] = TileEdge {
+            origin: i64::from(tile.width) - 1,
             dx: -1,
             dy: 0,
         };
-        count += 1;
+        edges[4] = TileEdge {
+            origin: i64::from(tile.height) - 1,
+            dx: 0,
+            dy: -1,
+        };
+        let side = TILE_SIDE as i32;
+        let is_inner = tile.width == side && tile.height == side;
+        Self {
+            edges,
+            count: if is_inner { 3 } else { MOST_EDGES },
+        }
     }
-    match count {
-        0 => draw_box::<S, 0>(simd, tile, prepared, pixels, [edges[0]; 0]),
-        1 => draw_box(simd, tile, prepared, pixels, [edges[0]]),
-        2 => draw_box(simd, tile, prepared, pixels, [edges[0], edges[1]]),
-        3 => draw_box(simd, tile, prepared, pixels, [edges[0], edges[1], edges[2]]),
-        _ => draw_box(simd, tile, prepared, pixels, edges),
+
+    /// Those that some but not all pixels of the blocks violate; `None` if all violate one.
+    #[inline(always)]
+    fn crossing(&self, range: BlockRange) -> Option<Self> {
+        let side = BLOCK_SIDE as i64;
+        let [x0, y0] = [range.x0 as i64 * side, range.y0 as i64 * side];
+        let [across, down] = [
+            (range.x1 - range.x0 + 1) as i64 * side - 1,
+            (range.y1 - range.y0 + 1) as i64 * side - 1,
+        ];
+        let mut crossing = Self {
+            edges: self.edges,
+            count: 0,
+        };
+        for edge in &self.edges[..self.count] {
+            let [dx, dy] = [i64::from(edge.dx), i64::from(edge.dy)];
+            let start = edge.origin + dx * x0 + dy * y0;
+            if start + (dx * across).max(0) + (dy * down).max(0) < 0 {
+                return None;
+            }
+            if start + (dx * across).min(0) + (dy * down).min(0) < 0 {
+                crossing.edges[crossing.count] = *edge;
+                crossing.count += 1;
+            }
+        }
+        Some(crossing)
     }
 }
 
-/// Draws the pixels of a box that violate none of `N` edges.
-#[inline(always)]
-fn draw_box<S: Simd, const N: usize>(
-    simd: S,
-    tile: &mut Tile,
-    prepared: &Prepared,
-    pixels: TileBox,
-    edges: [TileEdge; N],
-) {
-    let lanes = S::f32s::LEN;
-    let first = pixels.x0 as usize & !(lanes - 1);
-    let iota = S::i32s::from_fn(simd, |i| i as i32);
-    let plane = &prepared.depth;
-    let column = S::i32s::splat(simd, tile.origin[0] + first as i32 - plane.anchor[0]) + iota;
-    let column: S::f32s = column.to_float();
-    let slope = S::f32s::splat(simd, plane.dx);
-    let (near, far) = (
-        S::f32s::splat(simd, plane.max),
-        S::f32s::splat(simd, plane.min),
-    );
-    let id = S::u32s::splat(simd, prepared.id);
-    let zero = S::i32s::splat(simd, 0);
-    let mut row_start = [zero; N];
-    for k in 0..N {
-        row_start[k] = iota * edges[k].dx + edges[k].start;
-    }
-    for y in pixels.y0..=pixels.y1 {
-        let row_depth = plane.base + plane.dy * (tile.origin[1] + y - plane.anchor[1]) as f32;
-        let row_depth = S::f32s::splat(simd, row_depth);
-        let mut edge = row_start;
-        let mut column = column;
-        let mut x = first;
-        while x <= pixels.x1 as usize {
-            let mut signs = zero;
-            for e in edge {
-                signs |= e;
+/// A tile that is being drawn.
+struct Canvas<'a, S: Simd> {
+    tile: &'a mut Tile,
+    /// Reversed depth of each pixel, or [`NO_DEPTH`].
+    depth: [f32; TILE_PIXELS],
+    /// A depth that no pixel of a square is farther than.
+    farthest: [f32; SQUARES_ACROSS * SQUARES_ACROSS],
+    lanes: Lanes<S>,
+}
+
+impl<S: Simd> Canvas<'_, S> {
+    #[inline(always)]
+    fn draw(&mut self, simd: S, piece: &Piece) {
+        let pixels = piece.bounds.within(self.tile.origin);
+        let block = |pixel: i32| pixel as usize / BLOCK_SIDE;
+        let range = BlockRange {
+            x0: block(pixels.x0),
+            y0: block(pixels.y0),
+            x1: block(pixels.x1),
+            y1: block(pixels.y1),
+        };
+        let edges = Edges::of_piece(piece, self.tile);
+        if range.x1 - range.x0 < SQUARE_BLOCKS && range.y1 - range.y0 < SQUARE_BLOCKS {
+            if let Some(edges) = edges.crossing(range) {
+                self.draw_blocks(simd, piece, &edges, range);
             }
-            let inside = signs.simd_ge(zero);
-            if N == 0 || inside.any_true() {
-                let at = y as usize * TILE_SIDE + x;
-                let stored = S::f32s::from_slice(simd, &tile.depth[at..at + lanes]);
-                let depth = row_depth + slope * column;
-                let depth = depth.max(far).min(near);
-                let wins = inside & depth.simd_gt(stored);
-                if wins.any_true() {
-                    let owner = S::u32s::from_slice(simd, &tile.id[at..at + lanes]);
-                    wins.select(depth, stored)
-                        .store_slice(&mut tile.depth[at..at + lanes]);
-                    wins.select(id, owner)
-                        .store_slice(&mut tile.id[at..at + lanes]);
+            return;
+        }
+        for y in range.y0 / SQUARE_BLOCKS..=range.y1 / SQUARE_BLOCKS {
+            for x in range.x0 / SQUARE_BLOCKS..=range.x1 / SQUARE_BLOCKS {
+                self.draw_square(simd, piece, &edges, range, [x, y]);
+            }
+        }
+    }
+
+    /// Draws what of a large piece is in a square.
+    #[inline(always)]
+    fn draw_square(
+        &mut self,
+        simd: S,
+        piece: &Piece,
+        edges: &Edges,
+        range: BlockRange,
+        [x, y]: [usize; 2],
+    ) {
+        let square = y * SQUARES_ACROSS + x;
+        // What is not strictly nearer loses.
+        if piece.depth.max <= self.farthest[square] {
+            return;
+        }
+        let [first_x, first_y] = [x * SQUARE_BLOCKS, y * SQUARE_BLOCKS];
+        let inner = BlockRange {
+            x0: range.x0.max(first_x),
+            y0: range.y0.max(first_y),
+            x1: range.x1.min(first_x + SQUARE_BLOCKS - 1),
+            y1: range.y1.min(first_y + SQUARE_BLOCKS - 1),
+        };
+        let Some(edges) = edges.crossing(inner) else {
+            return;
+        };
+        self.draw_blocks(simd, piece, &edges, inner);
+        let blocks = (inner.x1 - inner.x0 + 1) * (inner.y1 - inner.y0 + 1);
+        if edges.count == 0 && blocks == SQUARE_BLOCKS * SQUARE_BLOCKS {
+            let nearest = self.farthest_of(&piece.depth, [first_x, first_y]);
+            self.farthest[square] = self.farthest[square].max(nearest);
+        }
+    }
+
+    /// The least depth of a plane over the pixels of a square. Rounding keeps order, so it is that of a corner.
+    #[inline(always)]
+    fn farthest_of(&self, depth: &DepthPlane, blocks: [usize; 2]) -> f32 {
+        let side = BLOCK_SIDE as i32;
+        let [x, y] = [
+            self.tile.origin[0] + blocks[0] as i32 * side,
+            self.tile.origin[1] + blocks[1] as i32 * side,
+        ];
+        let last = SQUARE_BLOCKS as i32 * side - 1;
+        let corners = [[x, y], [x + last, y], [x, y + last], [x + last, y + last]];
+        corners
+            .into_iter()
+            .map(|[x, y]| depth.at_pixel(x, y))
+            .fold(f32::INFINITY, f32::min)
+    }
+
+    #[inline(always)]
+    fn draw_blocks(&mut self, simd: S, piece: &Piece, edges: &Edges, range: BlockRange) {
+        let all = &edges.edges;
+        match edges.count {
+            0 => self.draw_inside(simd, piece, [], range),
+            1 => self.draw_inside(simd, piece, [all[0]], range),
+            2 => self.draw_inside(simd, piece, [all[0], all[1]], range),
+            3 => self.draw_inside(simd, piece, [all[0], all[1], all[2]], range),
+            // Edges that have not been used stay those of another edge, which does no harm.
+            _ => self.draw_inside(simd, piece, *all, range),
+        }
+    }
+
+    /// Draws the pixels of some blocks that violate none of `N` edges.
+    #[inline(always)]
+    fn draw_inside<const N: usize>(
+        &mut self,
+        simd: S,
+        piece: &Piece,
+        edges: [TileEdge; N],
+        range: BlockRange,
+    ) {
+        let lanes = self.lanes;
+        let width = S::i32s::LEN;
+        let zero = S::i32s::splat(simd, 0);
+        let mut inside_block = [[zero; MOST_PARTS]; N];
+        for k in 0..N {
+            for part in 0..Lanes::<S>::parts() {
+                inside_block[k][part] =
+                    lanes.column[part] * edges[k].dx + lanes.row[part] * edges[k].dy;
+            }
+        }
+        let side = BLOCK_SIDE as i32;
+        let plane = &piece.depth;
+        let [slope_x, slope_y] = [
+            S::f32s::splat(simd, plane.dx),
+            S::f32s::splat(simd, plane.dy),
+        ];
+        let base = S::f32s::splat(simd, plane.base);
+        let (near, far) = (
+            S::f32s::splat(simd, plane.max),
+            S::f32s::splat(simd, plane.min),
+        );
+        let slot = S::u32s::splat(simd, piece.slot);
+        let from_anchor = [
+            self.tile.origin[0] - plane.anchor[0],
+            self.tile.origin[1] - plane.anchor[1],
+        ];
+        for y in range.y0..=range.y1 {
+            for x in range.x0..=range.x1 {
+                let [left, top] = [x as i32 * side, y as i32 * side];
+                let mut corner = [0; N];
+                for k in 0..N {
+                    let value = edges[k].origin
+                        + i64::from(edges[k].dx) * i64::from(left)
+                        + i64::from(edges[k].dy) * i64::from(top);
+                    corner[k] = value as i32;
+                }
+                let block = y * BLOCKS_ACROSS + x;
+                for part in 0..Lanes::<S>::parts() {
+                    let mut signs = zero;
+                    for k in 0..N {
+                        signs |= inside_block[k][part] + corner[k];
+                    }
+                    let inside = signs.simd_ge(zero);
+                    if N > 0 && !inside.any_true() {
+                        continue;
+                    }
+                    let at = block * BLOCK_PIXELS + part * width;
+                    let column: S::f32s = (lanes.column[part] + (left + from_anchor[0])).to_float();
+                    let row: S::f32s = (lanes.row[part] + (top + from_anchor[1])).to_float();
+                    let depth = (base + slope_y * row) + slope_x * column;
+                    let depth = depth.max(far).min(near);
+                    let stored = S::f32s::from_slice(simd, &self.depth[at..at + width]);
+                    let wins = inside & depth.simd_gt(stored);
+                    if wins.any_true() {
+                        let owner = S::u32s::from_slice(simd, &self.tile.slot[at..at + width]);
+                        wins.select(depth, stored)
+                            .store_slice(&mut self.depth[at..at + width]);
+                        wins.select(slot, owner)
+                            .store_slice(&mut self.tile.slot[at..at + width]);
+                        self.tile.owned.insert(block);
+                    }
                 }
             }
-            for k in 0..N {
-                edge[k] += edges[k].dx * lanes as i32;
-            }
-            column += lanes as f32;
-            x += lanes;
-        }
-        for k in 0..N {
-            row_start[k] += edges[k].dy;
         }
     }
 }
 
-/// Cuts the tile's ids, row after row, into runs, and counts the covered pixels.
+/// Counts the covered pixels, and those of each triangle.
 #[inline(always)]
-fn collect_runs<S: Simd>(simd: S, tile: &mut Tile) {
-    let lanes = S::u32s::LEN;
-    tile.runs.clear();
-    let (mut start, mut id) = (0, tile.id[0]);
-    let (runs, covered) = (&mut tile.runs, &mut tile.covered);
-    *covered = 0;
-    let mut end_run = |id: u32, pixels: usize| {
-        if id != NO_TRIANGLE {
-            let pixels = pixels as u32;
-            *covered += pixels;
-            runs.push(Run { id, pixels });
-        }
-    };
-    for at in (0..TILE_PIXELS - 1).step_by(lanes) {
-        // A run ends behind each pixel that differs from the next. The last vector has its neighbours one to the left.
-        let neighbour = (at + 1).min(TILE_PIXELS - lanes);
-        let left = S::u32s::from_slice(simd, &tile.id[neighbour - 1..neighbour - 1 + lanes]);
-        let right = S::u32s::from_slice(simd, &tile.id[neighbour..neighbour + lanes]);
-        let mut ends = left.simd_ne(right).to_bitmask();
-        // Boundaries that the vector before has seen already.
-        ends &= u64::MAX << (at + 1 - neighbour);
-        while ends != 0 {
-            let next = neighbour + ends.trailing_zeros() as usize;
-            end_run(id, next - start);
-            (start, id) = (next, tile.id[next]);
-            ends &= ends - 1;
+fn count_owners<S: Simd>(simd: S, tile: &mut Tile, shares: &[Share]) {
+    let width = S::u32s::LEN;
+    let mut covered = 0;
+    // A large triangle fills block after block.
+    let (mut last, mut count) = (NO_TRIANGLE, 0);
+    for block in tile.owned.iter() {
+        for part in 0..BLOCK_PIXELS / width {
+            let at = block * BLOCK_PIXELS + part * width;
+            let slots = &tile.slot[at..at + width];
+            let vector = S::u32s::from_slice(simd, slots);
+            let mut left = vector.simd_ne(NO_TRIANGLE).to_bitmask();
+            covered += left.count_ones();
+            while left != 0 {
+                let slot = slots[left.trailing_zeros() as usize];
+                let pixels = vector.simd_eq(slot).to_bitmask();
+                if slot != last {
+                    if count > 0 {
+                        add_pixels(shares, last, count);
+                    }
+                    (last, count) = (slot, 0);
+                }
+                count += pixels.count_ones();
+                left &= !pixels;
+            }
         }
     }
-    end_run(id, TILE_PIXELS - start);
+    if count > 0 {
+        add_pixels(shares, last, count);
+    }
+    tile.covered = covered;
 }

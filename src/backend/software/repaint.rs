@@ -2,8 +2,8 @@
 //!
 //! [`patch`](super::patch) says which pixels those are and where to look for them.
 //!
-//! **Full vectors.** A row of a small patch has few pixels, and colours are dear. So a batch of pixels that may belong to the patch
-//! is collected from all its rows first, one behind the other without gaps; then weights, the test of
+//! **Full vectors.** A block of a small patch has few pixels, and colours are dear. So a batch of pixels that may belong to the patch
+//! is collected from all its blocks first, one behind the other without gaps; then weights, the test of
 //! ownership, colours and encoding run on full vectors; then the colours go back to where the pixels came from. What a lane
 //! gets does not depend on its neighbours, hence not on the width of vectors.
 //!
@@ -11,11 +11,14 @@
 
 use super::fill::{GouraudFill, PatchFill, PhongFill};
 use super::lanes::{gather, weights_at};
-use super::patch::{MAX_LANES, PatchEdges, Rows, patch_bounds};
+use super::patch::{MAX_LANES, PatchEdges, Rows, patch_bounds, slack};
 use super::resolve::Painter;
 use super::setup::corners;
-use super::tile::{Bounds, Grid, TILE_SIDE, Tile};
+use super::tile::{
+    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, Bounds, Grid, TILE_SIDE, Tile, TileBox, block_corner,
+};
 use super::transform::Vertices;
+use super::visible::Visible;
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
 use crate::geometry::screen::Interpolator;
@@ -43,7 +46,11 @@ pub(super) struct Job {
     tile: u32,
     /// Index of the patch.
     pub patch: u32,
+    /// Slot of the patch's triangle.
+    slot: u32,
     bounds: Bounds,
+    /// See [`slack`].
+    slack: f32,
     /// How many pixels were painted.
     pub pixels: u32,
 }
@@ -59,27 +66,39 @@ pub(super) fn plan(
     exec: Exec,
     jobs: &mut Vec<Job>,
     painter: &Painter<'_>,
+    visible: &Visible,
     grid: Grid,
     vertices: &Vertices,
     patches: &[Patch],
 ) {
     jobs.clear();
+    // Patches of one triangle follow each other as a rule.
+    let mut known = None;
     for (index, patch) in (0..).zip(patches) {
-        let Some(owner) = painter.visible.get(patch.triangle) else {
+        let Some((owner, slot)) = visible.get(painter.shares, patch.triangle) else {
             continue;
         };
         if Bary::doubled_area(patch.corners) <= 0 {
             continue;
         }
-        let triangle = painter.geometry.world.triangles[patch.triangle as usize];
-        let bounds = patch_bounds(owner, || corners(vertices, triangle), &patch.corners);
-        let Some(bounds) = bounds else {
+        let (corners, slack) = match known {
+            Some((triangle, corners, slack)) if triangle == patch.triangle => (corners, slack),
+            _ => {
+                let corners = corners(vertices, owner.vertices);
+                let slack = slack(owner, &corners);
+                known = Some((patch.triangle, corners, slack));
+                (corners, slack)
+            }
+        };
+        let Some(bounds) = patch_bounds(owner, slack, &corners, &patch.corners) else {
             continue;
         };
         jobs.extend(grid.touched(&bounds).map(|tile| Job {
             tile: tile as u32,
             patch: index,
+            slot,
             bounds,
+            slack,
             pixels: 0,
         }));
     }
@@ -185,73 +204,133 @@ fn paint_job<'a, S: Simd>(
     work: &mut Workspace<'a>,
 ) -> u32 {
     let world = painter.geometry.world;
+    let owner = painter.shares.drawn(job.slot);
+    let planes = owner.interpolator();
     match patch.fill {
         Fill::Gouraud(colours) => {
             let fill = GouraudFill::new(patch.corners, colours);
-            paint_patch(simd, tile, job, painter, patch, &fill, work)
+            paint_patch(simd, tile, job, painter.serial, &planes, patch, &fill, work)
         }
         Fill::Phong { lights, remainder } => {
-            let triangle = world.triangles[patch.triangle as usize];
             let fill = PhongFill {
-                kit: work.kit(painter, world.triangle_material[patch.triangle as usize]),
+                kit: work.kit(painter, owner.material),
                 lights,
-                positions: gather(&world.positions, triangle),
-                normals: gather(&world.normals, triangle),
+                positions: gather(&world.positions, owner.vertices),
+                normals: gather(&world.normals, owner.vertices),
                 remainder,
             };
-            paint_patch(simd, tile, job, painter, patch, &fill, work)
+            paint_patch(simd, tile, job, painter.serial, &planes, patch, &fill, work)
         }
     }
 }
 
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "what a job consists of")]
 fn paint_patch<S: Simd>(
     simd: S,
     tile: &mut Tile,
     job: &Job,
-    painter: &Painter<'_>,
+    serial: u64,
+    planes: &Interpolator,
     patch: &Patch,
     fill: &impl PatchFill,
     work: &mut Workspace<'_>,
 ) -> u32 {
-    let owner = painter.visible.owner(patch.triangle);
     let edges = (patch.corners != Bary::ROOT).then(|| PatchEdges::new(patch.corners));
     let pixels = job.bounds.within(tile.origin);
-    work.rows.find(simd, tile, pixels, owner, edges.as_ref());
-    let mut place = Place {
-        x: work.rows.first[pixels.y0 as usize],
-        y: pixels.y0,
-        last_y: pixels.y1,
-    };
+    work.rows
+        .find(simd, tile.origin, pixels, planes, job.slack, edges.as_ref());
+    let mut search = Search::new(pixels, &work.rows);
     let mut painted = 0;
     let mut changed = S::mask32s::splat(simd, false);
-    while place.y <= place.last_y {
+    while search.is_open() {
         let batch = &mut work.batch;
-        batch.collect(simd, tile, patch.triangle, &work.rows, &mut place);
-        painted += batch.colour(simd, tile.origin, &owner.planes, edges.as_ref(), fill);
+        batch.collect(simd, tile, job.slot, &work.rows, &mut search);
+        painted += batch.colour(simd, tile.origin, planes, edges.as_ref(), fill);
         changed |= batch.put_back(simd, tile);
     }
     if changed.any_true() {
-        tile.serial = painter.serial;
+        tile.serial = serial;
     }
     painted
 }
 
-/// How far a patch has been searched for pixels.
+/// How far a patch has been searched for pixels: block after block, along rows of blocks.
 #[derive(Clone, Copy, Debug)]
-struct Place {
-    /// The next column.
-    x: i32,
-    /// The row.
-    y: i32,
-    /// The last row.
-    last_y: i32,
+struct Search {
+    /// First and last row of pixels.
+    rows: [usize; 2],
+    /// The row of blocks.
+    block_row: usize,
+    /// The next block in it, and the one behind the last.
+    next: usize,
+    end: usize,
 }
 
-/// Some lanes of consecutive pixels of a row.
+impl Search {
+    #[inline(always)]
+    fn new(pixels: TileBox, rows: &Rows) -> Self {
+        let [y0, y1] = [pixels.y0 as usize, pixels.y1 as usize];
+        let mut search = Self {
+            rows: [y0, y1],
+            block_row: y0 / BLOCK_SIDE,
+            next: 0,
+            end: 0,
+        };
+        search.enter_row(rows);
+        search
+    }
+
+    /// Whether there may be more pixels.
+    #[inline(always)]
+    fn is_open(&self) -> bool {
+        self.block_row <= self.rows[1] / BLOCK_SIDE
+    }
+
+    /// First and last row of pixels that are in the row of blocks.
+    #[inline(always)]
+    fn rows_here(&self) -> [usize; 2] {
+        let top = self.block_row * BLOCK_SIDE;
+        [
+            self.rows[0].max(top),
+            self.rows[1].min(top + BLOCK_SIDE - 1),
+        ]
+    }
+
+    #[inline(always)]
+    fn enter_row(&mut self, rows: &Rows) {
+        let [y0, y1] = self.rows_here();
+        [self.next, self.end] = rows.blocks(y0, y1);
+    }
+
+    #[inline(always)]
+    fn next_row(&mut self, rows: &Rows) {
+        self.block_row += 1;
+        if self.is_open() {
+            self.enter_row(rows);
+        }
+    }
+}
+
+/// The columns and rows of pixels in their tile, given by their indices: the inverse of
+/// [`pixel_index`](super::tile::pixel_index).
+#[inline(always)]
+fn place_of_index<S: Simd>(index: S::i32s) -> [S::i32s; 2] {
+    let block_bits = BLOCK_PIXELS.trailing_zeros();
+    let side_bits = BLOCK_SIDE.trailing_zeros();
+    let in_block = BLOCK_SIDE as i32 - 1;
+    let of_blocks = TILE_SIDE as i32 - BLOCK_SIDE as i32;
+    let column = ((index >> (block_bits - side_bits)) & of_blocks) | (index & in_block);
+    let across_bits = BLOCKS_ACROSS.trailing_zeros();
+    let row = ((index >> (block_bits + across_bits - side_bits)) & of_blocks)
+        | ((index >> side_bits) & in_block);
+    [column, row]
+}
+
+/// Some lanes of consecutive pixels of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct Chunk {
-    /// Index of the first pixel in the tile.
+    /// Index in the tile of the first lane.
     at: u16,
     /// One bit for each lane.
     lanes: u16,
@@ -281,35 +360,39 @@ impl Batch {
         }
     }
 
-    /// Starts anew with the triangle's next pixels, until there are no more or the batch is full.
+    /// Starts anew with the next pixels of the triangle that has the slot, until there are no more or the batch is full.
     #[inline(always)]
     fn collect<S: Simd>(
         &mut self,
         simd: S,
         tile: &Tile,
-        triangle: u32,
+        slot: u32,
         rows: &Rows,
-        place: &mut Place,
+        search: &mut Search,
     ) {
         let lanes = S::u32s::LEN;
         let iota = S::u32s::from_fn(simd, |i| i as u32);
-        let triangle = S::u32s::splat(simd, triangle);
+        let slot = S::u32s::splat(simd, slot);
         let (mut len, mut chunks_len) = (0, 0);
-        'rows: while place.y <= place.last_y {
-            let last = rows.last[place.y as usize];
-            while place.x <= last {
-                if len + lanes > BATCH {
-                    break 'rows;
+        while search.is_open() {
+            let [y0, y1] = search.rows_here();
+            while search.next < search.end {
+                if len + BLOCK_PIXELS > BATCH {
+                    (self.len, self.chunks_len) = (len, chunks_len);
+                    return;
                 }
-                // A vector stays in its row, so it may have to start early; what it has seen already is left out.
-                let start = place.x.min((TILE_SIDE - lanes) as i32);
-                let at = place.y as usize * TILE_SIDE + start as usize;
-                let ids = S::u32s::from_slice(simd, &tile.id[at..at + lanes]);
-                // Wraps in front of the place, so that one comparison does for both ends.
-                let column = iota - (place.x - start) as u32;
-                let mask = ids.simd_eq(triangle) & column.simd_le((last - place.x) as u32);
-                let bits = mask.to_bitmask();
-                if bits != 0 {
+                let block = search.block_row * BLOCKS_ACROSS + search.next;
+                search.next += 1;
+                let within = rows.within_block(block_corner(block), y0, y1);
+                for part in 0..BLOCK_PIXELS / lanes {
+                    let at = block * BLOCK_PIXELS + part * lanes;
+                    let slots = S::u32s::from_slice(simd, &tile.slot[at..at + lanes]);
+                    let bits =
+                        slots.simd_eq(slot).to_bitmask() & u64::from(within >> (part * lanes));
+                    if bits == 0 {
+                        continue;
+                    }
+                    let mask = S::mask32s::from_bitmask(simd, bits);
                     let index = (iota + at as u32).compress(mask);
                     index.store_slice(&mut self.index[len..len + lanes]);
                     self.chunks[chunks_len] = Chunk {
@@ -319,10 +402,8 @@ impl Batch {
                     chunks_len += 1;
                     len += bits.count_ones() as usize;
                 }
-                place.x = start + lanes as i32;
             }
-            place.y += 1;
-            place.x = rows.first[place.y as usize];
+            search.next_row(rows);
         }
         (self.len, self.chunks_len) = (len, chunks_len);
     }
@@ -344,8 +425,9 @@ impl Batch {
         for at in (0..self.len).step_by(lanes) {
             let index = S::u32s::from_slice(simd, &self.index[at..at + lanes]);
             let index: S::i32s = index.bitcast();
-            let dx = ((index & (TILE_SIDE as i32 - 1)) + offset[0]).to_float();
-            let dy = ((index >> TILE_SIDE.trailing_zeros()) + offset[1]).to_float();
+            let [column, row] = place_of_index::<S>(index);
+            let dx = (column + offset[0]).to_float();
+            let dy = (row + offset[1]).to_float();
             let w = weights_at(simd, planes, dx, dy);
             let mut mask = iota.simd_lt((self.len - at) as i32);
             if let Some(edges) = edges {

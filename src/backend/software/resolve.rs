@@ -1,28 +1,32 @@
 //! Colours for every pixel of a tile.
 //!
+//! Only blocks in which some pixel has an owner are looked at; one that has lost all of them gets the background, and one that
+//! had none before either is left alone.
+//!
 //! A vector of pixels belongs to one triangle or to a few. The triangles in it are taken one after the other,
 //! each fills its lanes of the linear colour (or, for per-pixel illumination, of the position and normal, which are then
 //! illuminated together, once for each material), and the vector is encoded once. What a lane gets does not depend on its
 //! neighbours.
 
-use super::lanes::{Corners3, Lanes3, gather, interpolate, select3, splat3, weights};
-use super::tile::{NO_TRIANGLE, TILE_SIDE, Tile};
-use super::visible::Visible;
+use super::lanes::{Corners3, Lanes3, gather, interpolate, select3, splat3, weights_at};
+use super::setup::Drawn;
+use super::shares::Shares;
+use super::tile::{BLOCK_PIXELS, BLOCK_SIDE, NO_TRIANGLE, Tile, block_corner};
 use crate::backend::{BasePaint, Geometry};
 use crate::geometry::Vec3s;
 use crate::illumination::{ActiveLights, ShadingKit, shade_lanes};
 use crate::output::encode::encode_lanes;
 use crate::scene::World;
 use crate::simd::Simd;
-use fearless_simd::{SimdBase, SimdMask};
+use fearless_simd::{SimdBase, SimdInt, SimdMask};
 
 /// What a pass over tiles reads.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Painter<'a> {
     /// What is drawn.
     pub geometry: Geometry<'a>,
     /// Who owns pixels.
-    pub visible: &'a Visible,
+    pub shares: &'a Shares,
     /// The number of this pass.
     pub serial: u64,
 }
@@ -41,12 +45,6 @@ impl<'a> Painter<'a> {
             &world.lights,
         )
     }
-
-    /// Weights of a visible triangle's corners at the pixels of a row that start at `(x, y)`.
-    #[inline(always)]
-    fn weights<S: Simd>(&self, simd: S, id: u32, [x, y]: [i32; 2]) -> Lanes3<S> {
-        weights(simd, &self.visible.owner(id).planes, x, y)
-    }
 }
 
 /// Paints a tile.
@@ -57,9 +55,9 @@ pub(super) fn resolve_tile<S: Simd>(
     painter: &Painter<'_>,
     paint: BasePaint<'_>,
 ) {
-    let background = splat3(simd, painter.world().background);
-    if tile.covered == 0 {
-        fill(tile, encode_lanes(simd, background)[0], painter.serial);
+    let background = encode_lanes(simd, splat3(simd, painter.world().background));
+    fill_background(tile, background[0], painter.serial);
+    if tile.owned.is_empty() {
         return;
     }
     match paint {
@@ -73,7 +71,9 @@ pub(super) fn resolve_tile<S: Simd>(
             };
             paint_tile(simd, tile, painter, &mut gouraud);
         }
-        BasePaint::Flat(colours) => paint_tile(simd, tile, painter, &mut Flat { colours }),
+        BasePaint::Flat(colours) => {
+            paint_tile(simd, tile, painter, &mut Flat { painter, colours });
+        }
         BasePaint::Phong => {
             let active = ActiveLights::all(painter.world().lights.len());
             let mut phong = Phong {
@@ -86,31 +86,47 @@ pub(super) fn resolve_tile<S: Simd>(
     }
 }
 
-/// Fills a tile without triangles.
-fn fill(tile: &mut Tile, colour: u32, serial: u64) {
-    if tile.filled != Some(colour) {
-        tile.colour.fill(colour);
-        tile.filled = Some(colour);
+/// Gives blocks that no triangle has a pixel of the background's colour, unless they have it already.
+fn fill_background(tile: &mut Tile, background: u32, serial: u64) {
+    if tile.background != Some(background) {
+        tile.colour.fill(background);
+        tile.background = Some(background);
         tile.serial = serial;
+    } else {
+        for block in tile.painted.without(tile.owned).iter() {
+            let at = block * BLOCK_PIXELS;
+            tile.colour[at..at + BLOCK_PIXELS].fill(background);
+            tile.serial = serial;
+        }
     }
+    tile.painted = tile.owned;
 }
 
 /// The triangles in a vector of pixels.
 #[derive(Clone, Copy)]
 struct Owners<'a, S: Simd> {
-    ids: S::u32s,
+    slots: S::u32s,
     /// The same in memory.
     slice: &'a [u32],
-    /// The first pixel in the image.
-    pixel: [i32; 2],
+    /// Columns and rows of the pixels in the image.
+    column: S::f32s,
+    row: S::f32s,
 }
 
 impl<S: Simd> Owners<'_, S> {
-    /// The owner of the first pixel in a bit set, and all pixels that it owns.
+    /// The slot of the owner of the first pixel in a bit set, and all pixels that it owns.
     #[inline(always)]
     fn first(&self, pixels: u64) -> (u32, S::mask32s) {
-        let id = self.slice[pixels.trailing_zeros() as usize];
-        (id, self.ids.simd_eq(id))
+        let slot = self.slice[pixels.trailing_zeros() as usize];
+        (slot, self.slots.simd_eq(slot))
+    }
+
+    /// Weights of a triangle's corners at the pixels.
+    #[inline(always)]
+    fn weights(&self, simd: S, drawn: &Drawn) -> Lanes3<S> {
+        let planes = drawn.interpolator();
+        let [x, y] = planes.anchor.map(|v| v as f32);
+        weights_at(simd, &planes, self.column - x, self.row - y)
     }
 }
 
@@ -135,31 +151,32 @@ fn paint_tile<S: Simd>(
 ) {
     let lanes = S::u32s::LEN;
     let background = splat3(simd, painter.world().background);
-    let encoded_background = encode_lanes(simd, background);
+    let iota = S::i32s::from_fn(simd, |i| i as i32);
     let mut changed = S::mask32s::splat(simd, false);
-    for y in 0..tile.height {
-        for x in (0..tile.width).step_by(lanes) {
-            let at = y as usize * TILE_SIDE + x as usize;
-            let slice = &tile.id[at..at + lanes];
-            let ids = S::u32s::from_slice(simd, slice);
-            let covered = ids.simd_ne(NO_TRIANGLE).to_bitmask();
-            let colour = if covered == 0 {
-                encoded_background
-            } else {
-                let owners = Owners {
-                    ids,
-                    slice,
-                    pixel: [tile.origin[0] + x, tile.origin[1] + y],
-                };
-                let linear = surface.colours(simd, owners, covered, background);
-                encode_lanes(simd, linear)
+    for block in tile.owned.iter() {
+        let [x, y] = block_corner(block);
+        let corner = [(tile.origin[0] + x) as f32, (tile.origin[1] + y) as f32];
+        for part in 0..BLOCK_PIXELS / lanes {
+            let at = block * BLOCK_PIXELS + part * lanes;
+            let slice = &tile.slot[at..at + lanes];
+            let slots = S::u32s::from_slice(simd, slice);
+            let covered = slots.simd_ne(NO_TRIANGLE).to_bitmask();
+            let pixel = iota + (part * lanes) as i32;
+            let column: S::f32s = (pixel & (BLOCK_SIDE as i32 - 1)).to_float();
+            let row: S::f32s = (pixel >> BLOCK_SIDE.trailing_zeros()).to_float();
+            let owners = Owners {
+                slots,
+                slice,
+                column: column + corner[0],
+                row: row + corner[1],
             };
+            let linear = surface.colours(simd, owners, covered, background);
+            let colour = encode_lanes(simd, linear);
             let stored = &mut tile.colour[at..at + lanes];
             changed |= colour.simd_ne(S::u32s::from_slice(simd, stored));
             colour.store_slice(stored);
         }
     }
-    tile.filled = None;
     if changed.any_true() {
         tile.serial = painter.serial;
     }
@@ -169,7 +186,7 @@ fn paint_tile<S: Simd>(
 struct Gouraud<'a> {
     painter: &'a Painter<'a>,
     colours: &'a Vec3s,
-    /// The triangle painted last: as a rule the next vector begins with it.
+    /// The slot painted last: as a rule the next vector begins with it.
     last: u32,
     /// Its corners' colours.
     corners: Corners3,
@@ -186,12 +203,12 @@ impl Surface for Gouraud<'_> {
     ) -> Lanes3<S> {
         let (mut left, mut out) = (covered, background);
         while left != 0 {
-            let (id, mask) = owners.first(left);
-            let w = self.painter.weights(simd, id, owners.pixel);
-            if id != self.last {
-                let triangle = self.painter.world().triangles[id as usize];
-                self.corners = gather(self.colours, triangle);
-                self.last = id;
+            let (slot, mask) = owners.first(left);
+            let drawn = self.painter.shares.drawn(slot);
+            let w = owners.weights(simd, drawn);
+            if slot != self.last {
+                self.corners = gather(self.colours, drawn.vertices);
+                self.last = slot;
             }
             let colour = interpolate(simd, w, &self.corners);
             out = select3::<S>(mask, colour, out);
@@ -203,6 +220,7 @@ impl Surface for Gouraud<'_> {
 
 /// One colour for each triangle.
 struct Flat<'a> {
+    painter: &'a Painter<'a>,
     colours: &'a Vec3s,
 }
 
@@ -217,8 +235,9 @@ impl Surface for Flat<'_> {
     ) -> Lanes3<S> {
         let (mut left, mut out) = (covered, background);
         while left != 0 {
-            let (id, mask) = owners.first(left);
-            let colour = splat3(simd, self.colours.get(id as usize));
+            let (slot, mask) = owners.first(left);
+            let drawn = self.painter.shares.drawn(slot);
+            let colour = splat3(simd, self.colours.get(drawn.id as usize));
             out = select3::<S>(mask, colour, out);
             left &= !mask.to_bitmask();
         }
@@ -261,17 +280,17 @@ impl Surface for Phong<'_> {
         let (mut left, mut out) = (covered, background);
         while left != 0 {
             // All pixels with the material of the first.
-            let material = world.triangle_material[owners.first(left).0 as usize];
+            let material = self.painter.shares.drawn(owners.first(left).0).material;
             let mut alike = S::mask32s::splat(simd, false);
             let (mut point, mut normal) = (background, background);
             let mut unseen = left;
             while unseen != 0 {
-                let (id, mask) = owners.first(unseen);
-                if world.triangle_material[id as usize] == material {
-                    let w = self.painter.weights(simd, id, owners.pixel);
-                    let triangle = world.triangles[id as usize];
-                    let p = interpolate(simd, w, &gather(&world.positions, triangle));
-                    let n = interpolate(simd, w, &gather(&world.normals, triangle));
+                let (slot, mask) = owners.first(unseen);
+                let drawn = self.painter.shares.drawn(slot);
+                if drawn.material == material {
+                    let w = owners.weights(simd, drawn);
+                    let p = interpolate(simd, w, &gather(&world.positions, drawn.vertices));
+                    let n = interpolate(simd, w, &gather(&world.normals, drawn.vertices));
                     point = select3::<S>(mask, p, point);
                     normal = select3::<S>(mask, n, normal);
                     alike |= mask;

@@ -1,27 +1,38 @@
-//! Triangle set-up: culling, clipping, and what the tiles need to draw a triangle; then binning.
+//! Triangle set-up: culling, clipping, and what the tiles need to draw and to colour a triangle; then binning.
 //!
 //! A triangle is dropped when all its corners are outside of one clipping plane, when its snapped area says that it faces
-//! away, or when no pixel centre lies in its box. A triangle with a corner outside of some plane is clipped and becomes a
-//! fan of triangles with the same id. The fan faces the way its whole snapped area says; single pieces that rounding
-//! turned the other way are left out. Depth comes from the unclipped triangle, anchored at the top left pixel of the box of
+//! away, or when no pixel centre lies in its box. That is found out for a batch of consecutive triangles at a time; the planes of
+//! those left are worked out several at a time (see [`planes`](super::planes)).
+//!
+//! A triangle with a corner outside of some plane is clipped and becomes a
+//! fan of pieces. The fan faces the way its whole snapped area says; single pieces that rounding
+//! turned the other way are left out. Planes come from the unclipped triangle, anchored at the top left pixel of the box of
 //! everything that is left of it, so that all pieces agree.
 //!
 //! Bins are made for each share of triangles by itself (a counting sort by tile), and a tile looks into every share's bin in
 //! turn: nothing is merged, and each bin lists its triangles in ascending order.
 
 use super::fit;
+use super::planes::{Corners, TRIANGLES};
 use super::shares::Share;
 use super::tile::{Bounds, Grid};
-use super::transform::Vertices;
-use crate::backend::{Geometry, RasterCounts};
-use crate::geometry::screen::{DepthPlane, PixelBox, TrianglePlanes, clip, doubled_area, snap};
+use super::transform::{SnappedVertex, Vertices};
+use crate::backend::Geometry;
+use crate::geometry::screen::{
+    DepthPlane, Interpolator, PixelBox, SUBPIXEL_BITS, TrianglePlanes, clip, doubled_area, snap,
+};
 use crate::math::PixelPoint;
+use crate::simd::Simd;
+
+/// Triangles looked at together.
+const BATCH: usize = 16;
 
 /// A triangle, or a piece of a clipped one, ready to be drawn: one cache line.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Prepared {
-    /// The world's triangle.
-    pub id: u32,
+#[repr(align(64))]
+pub(super) struct Piece {
+    /// The triangle's slot.
+    pub slot: u32,
     /// The pixels that may be covered.
     pub bounds: Bounds,
     /// Snapped corners, turned so that their area is positive.
@@ -30,136 +41,400 @@ pub(super) struct Prepared {
     pub depth: DepthPlane,
 }
 
-/// The snapped outline of a triangle: itself, or what clipping left of it.
+/// What colouring the pixels of a drawn triangle takes: one cache line.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Outline {
+#[repr(align(64))]
+pub(super) struct Drawn {
+    /// Slopes to the right and down, and value at the first pixel of `bounds`, of each corner's barycentric plane.
+    planes: [[f32; 3]; 3],
+    /// The pixels that may be covered.
+    pub bounds: Bounds,
+    /// The world's number of the triangle.
+    pub id: u32,
+    /// The world's vertices.
+    pub vertices: [u32; 3],
+    /// The world's material.
+    pub material: u16,
+    /// Whether it had to be clipped.
+    pub is_clipped: bool,
+}
+
+impl Drawn {
+    /// Its barycentric planes.
+    #[inline(always)]
+    pub(super) fn interpolator(&self) -> Interpolator {
+        let [a, b, c] = self.planes;
+        Interpolator {
+            anchor: self.bounds.anchor(),
+            a,
+            b,
+            c,
+        }
+    }
+}
+
+/// The corners of a triangle in homogeneous pixel space.
+#[inline(always)]
+pub(super) fn corners(vertices: &Vertices, triangle: [u32; 3]) -> [PixelPoint; 3] {
+    [
+        vertices.point(triangle[0]),
+        vertices.point(triangle[1]),
+        vertices.point(triangle[2]),
+    ]
+}
+
+/// Sets up and bins a share's triangles.
+#[inline(always)]
+pub(super) fn set_up<S: Simd>(
+    _simd: S,
+    share: &mut Share,
+    geometry: Geometry<'_>,
+    grid: Grid,
+    vertices: &Vertices,
+) {
+    let setup = Setup {
+        geometry,
+        grid,
+        vertices,
+    };
+    share.clear();
+    let mut pending = Pending::new();
+    for range in share.ranges(geometry) {
+        let first = range.start;
+        for (index, triangles) in geometry.world.triangles[range].chunks(BATCH).enumerate() {
+            let first = (first + index * BATCH) as u32;
+            setup.batch(share, &mut pending, first, triangles);
+        }
+    }
+    setup.flush(share, &mut pending);
+    bin(share, grid);
+}
+
+/// The corners of a batch of triangles on the sub-pixel grid, and what they say.
+struct Batch {
+    /// By corner.
+    x: [[i32; BATCH]; 3],
+    /// By corner.
+    y: [[i32; BATCH]; 3],
+    /// Planes that some corner is outside of.
+    some_outside: [u32; BATCH],
+    /// Planes that all corners are outside of.
+    all_outside: [u32; BATCH],
+}
+
+/// What becomes of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verdict {
+    OffScreen,
+    BackFacing,
+    Clip,
+    Draw,
+}
+
+impl Batch {
+    #[inline(always)]
+    fn gather(vertices: &Vertices, triangles: &[[u32; 3]]) -> Self {
+        let mut batch = Self {
+            x: [[0; BATCH]; 3],
+            y: [[0; BATCH]; 3],
+            some_outside: [0; BATCH],
+            all_outside: [0; BATCH],
+        };
+        for (i, triangle) in triangles.iter().enumerate().take(BATCH) {
+            let mut codes = [0; 3];
+            for corner in 0..3 {
+                let SnappedVertex { position, outcode } = vertices.snapped(triangle[corner]);
+                [batch.x[corner][i], batch.y[corner][i]] = position;
+                codes[corner] = outcode;
+            }
+            batch.some_outside[i] = codes[0] | codes[1] | codes[2];
+            batch.all_outside[i] = codes[0] & codes[1] & codes[2];
+        }
+        batch
+    }
+
+    /// The corners of a triangle.
+    #[inline(always)]
+    fn corners(&self, i: usize) -> [[i32; 2]; 3] {
+        [
+            [self.x[0][i], self.y[0][i]],
+            [self.x[1][i], self.y[1][i]],
+            [self.x[2][i], self.y[2][i]],
+        ]
+    }
+
+    /// Positive where a triangle turns its front to the viewer, negative where its back, zero where it has no area:
+    /// twice the area in squared sub-pixels, exactly, since the differences of coordinates are below `2^23`. Valid where all corners are inside.
+    #[inline(always)]
+    fn doubled_areas(&self) -> [f64; BATCH] {
+        let mut out = [0.0; BATCH];
+        for i in 0..BATCH {
+            let [ux, uy] =
+                [self.x[1][i] - self.x[0][i], self.y[1][i] - self.y[0][i]].map(f64::from);
+            let [vx, vy] =
+                [self.x[2][i] - self.x[0][i], self.y[2][i] - self.y[0][i]].map(f64::from);
+            out[i] = uy * vx - ux * vy;
+        }
+        out
+    }
+
+    /// First and last pixel along an axis of `size` pixels whose centres lie in the triangles' boxes, as
+    /// [`PixelBox::of_snapped`] has them.
+    #[inline(always)]
+    fn pixel_ranges(v: &[[i32; BATCH]; 3], size: u32) -> [[i32; BATCH]; 2] {
+        let half = 1 << (SUBPIXEL_BITS - 1);
+        let (mut first, mut last) = ([0; BATCH], [0; BATCH]);
+        for i in 0..BATCH {
+            let min = v[0][i].min(v[1][i]).min(v[2][i]);
+            let max = v[0][i].max(v[1][i]).max(v[2][i]);
+            first[i] = ((min + (half - 1)) >> SUBPIXEL_BITS).max(0);
+            last[i] = ((max - half) >> SUBPIXEL_BITS).min(size as i32 - 1);
+        }
+        [first, last]
+    }
+}
+
+/// What set-up reads.
+struct Setup<'a> {
+    geometry: Geometry<'a>,
+    grid: Grid,
+    vertices: &'a Vertices,
+}
+
+impl Setup<'_> {
+    /// Sets up consecutive triangles, the first of which is number `first`.
+    #[inline(always)]
+    fn batch(&self, share: &mut Share, pending: &mut Pending, first: u32, triangles: &[[u32; 3]]) {
+        let batch = Batch::gather(self.vertices, triangles);
+        let areas = batch.doubled_areas();
+        let [x0, x1] = Batch::pixel_ranges(&batch.x, self.grid.width);
+        let [y0, y1] = Batch::pixel_ranges(&batch.y, self.grid.height);
+        let mut verdicts = [Verdict::OffScreen; BATCH];
+        for i in 0..BATCH {
+            let has_pixels = (x0[i] <= x1[i]) & (y0[i] <= y1[i]) & (areas[i] != 0.0);
+            let inside = if areas[i] < 0.0 {
+                Verdict::BackFacing
+            } else if has_pixels {
+                Verdict::Draw
+            } else {
+                Verdict::OffScreen
+            };
+            let outside = if batch.all_outside[i] == 0 {
+                Verdict::Clip
+            } else {
+                Verdict::OffScreen
+            };
+            verdicts[i] = if batch.some_outside[i] == 0 {
+                inside
+            } else {
+                outside
+            };
+        }
+        share.counts.submitted += triangles.len() as u64;
+        for (i, &triangle) in triangles.iter().enumerate().take(BATCH) {
+            match verdicts[i] {
+                Verdict::OffScreen => share.counts.off_screen += 1,
+                Verdict::BackFacing => share.counts.back_facing += 1,
+                Verdict::Clip => {
+                    // In order.
+                    self.flush(share, pending);
+                    self.clip(share, first + i as u32, triangle);
+                }
+                Verdict::Draw => {
+                    let bounds = PixelBox {
+                        x0: x0[i],
+                        y0: y0[i],
+                        x1: x1[i],
+                        y1: y1[i],
+                    };
+                    pending.push(
+                        self.vertices,
+                        first + i as u32,
+                        triangle,
+                        batch.corners(i),
+                        bounds,
+                    );
+                    if pending.len == TRIANGLES {
+                        self.flush(share, pending);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Finishes the triangles that wait for their planes.
+    #[inline(always)]
+    fn flush(&self, share: &mut Share, pending: &mut Pending) {
+        if pending.len == 0 {
+            return;
+        }
+        let world = self.geometry.world;
+        let planes = pending.corners.planes();
+        for (i, waiting) in pending.triangles[..pending.len].iter().enumerate() {
+            let mut depth = planes.depth(i, waiting.bounds.anchor());
+            if world.backs.contains(&waiting.id) {
+                depth = depth.moved_back();
+            }
+            let slot = share.push(Drawn {
+                planes: planes.interpolator(i),
+                bounds: waiting.bounds,
+                id: waiting.id,
+                vertices: waiting.vertices,
+                material: world.triangle_material[waiting.id as usize],
+                is_clipped: false,
+            });
+            share.pieces.push(Piece {
+                slot,
+                bounds: waiting.bounds,
+                corners: waiting.corners,
+                depth,
+            });
+        }
+        share.counts.drawn += pending.len as u64;
+        pending.len = 0;
+    }
+
+    /// Sets up a triangle of which something is outside of a clipping plane.
+    #[inline(never)]
+    fn clip(&self, share: &mut Share, id: u32, triangle: [u32; 3]) {
+        let world = self.geometry.world;
+        let [width, height] = [self.grid.width, self.grid.height];
+        let corners = corners(self.vertices, triangle);
+        let outline = Outline::of_clipped(corners);
+        let area = outline.doubled_area();
+        if area < 0 {
+            share.counts.back_facing += 1;
+            return;
+        }
+        let Some(pixels) = outline.pixel_box(width, height).filter(|_| area != 0) else {
+            share.counts.off_screen += 1;
+            return;
+        };
+        share.counts.clipped += 1;
+        share.counts.drawn += 1;
+        let anchor = [pixels.x0, pixels.y0];
+        let planes = TrianglePlanes::new(corners);
+        let mut depth = planes.depth(anchor);
+        if world.backs.contains(&id) {
+            depth = depth.moved_back();
+        }
+        let interpolator = planes.interpolator(anchor);
+        let slot = share.push(Drawn {
+            planes: [interpolator.a, interpolator.b, interpolator.c],
+            bounds: pixels.into(),
+            id,
+            vertices: triangle,
+            material: world.triangle_material[id as usize],
+            is_clipped: true,
+        });
+        for corners in outline.fan() {
+            let bounds = PixelBox::of_snapped(&corners, width, height);
+            if let Some(bounds) = bounds.filter(|_| doubled_area(corners) > 0) {
+                share.pieces.push(Piece {
+                    slot,
+                    bounds: bounds.into(),
+                    corners,
+                    depth,
+                });
+            }
+        }
+    }
+}
+
+/// Triangles to be drawn that wait for their planes.
+struct Pending {
+    corners: Corners,
+    triangles: [Waiting; TRIANGLES],
+    len: usize,
+}
+
+/// A triangle that waits for its planes.
+#[derive(Clone, Copy, Default)]
+struct Waiting {
+    id: u32,
+    vertices: [u32; 3],
+    corners: [[i32; 2]; 3],
+    bounds: Bounds,
+}
+
+impl Pending {
+    fn new() -> Self {
+        Self {
+            corners: Corners::NONE,
+            triangles: [Waiting::default(); TRIANGLES],
+            len: 0,
+        }
+    }
+
+    #[inline(always)]
+    fn push(
+        &mut self,
+        all: &Vertices,
+        id: u32,
+        vertices: [u32; 3],
+        snapped: [[i32; 2]; 3],
+        bounds: PixelBox,
+    ) {
+        self.corners
+            .set(self.len, corners(all, vertices), [bounds.x0, bounds.y0]);
+        self.triangles[self.len] = Waiting {
+            id,
+            vertices,
+            corners: snapped,
+            bounds: bounds.into(),
+        };
+        self.len += 1;
+    }
+}
+
+/// The snapped outline of what clipping left of a triangle.
+#[derive(Clone, Copy, Debug)]
+struct Outline {
     points: [[i32; 2]; 9],
     len: usize,
-    /// Whether it had to be clipped.
-    pub clipped: bool,
 }
 
 impl Outline {
-    /// The outline of a triangle; `None` when clipping leaves nothing.
-    #[inline(always)]
-    pub(super) fn new(vertices: &Vertices, triangle: [u32; 3]) -> Option<Self> {
-        let codes = triangle.map(|v| vertices.outcode(v));
-        if codes[0] & codes[1] & codes[2] != 0 {
-            return None;
-        }
+    /// Empty when clipping leaves nothing.
+    fn of_clipped(corners: [PixelPoint; 3]) -> Self {
+        let polygon = clip(corners);
         let mut points = [[0; 2]; 9];
-        if codes[0] | codes[1] | codes[2] == 0 {
-            for (point, vertex) in points.iter_mut().zip(triangle) {
-                *point = vertices.snapped(vertex);
-            }
-            return Some(Self {
-                points,
-                len: 3,
-                clipped: false,
-            });
-        }
-        let polygon = clip(triangle.map(|v| vertices.point(v)));
         for (point, &vertex) in points.iter_mut().zip(polygon.vertices()) {
             *point = snap(vertex);
         }
-        let len = polygon.vertices().len();
-        (len >= 3).then_some(Self {
+        Self {
             points,
-            len,
-            clipped: true,
-        })
+            len: polygon.vertices().len(),
+        }
     }
 
     /// The triangles of its fan.
-    #[inline]
     fn fan(&self) -> impl Iterator<Item = [[i32; 2]; 3]> {
         let points = &self.points[..self.len];
-        points[1..].windows(2).map(|p| [points[0], p[0], p[1]])
+        let rest = points.get(1..).unwrap_or_default();
+        rest.windows(2).map(|p| [points[0], p[0], p[1]])
     }
 
     /// Twice its signed area in squared sub-pixels, exactly.
-    #[inline]
     fn doubled_area(&self) -> i64 {
         self.fan().map(doubled_area).sum()
     }
 
     /// The pixels that may be covered.
-    #[inline]
-    pub(super) fn pixel_box(&self, width: u32, height: u32) -> Option<PixelBox> {
+    fn pixel_box(&self, width: u32, height: u32) -> Option<PixelBox> {
         PixelBox::of_snapped(&self.points[..self.len], width, height)
     }
 }
 
-/// The corners of a triangle in homogeneous pixel space.
-#[inline]
-pub(super) fn corners(vertices: &Vertices, triangle: [u32; 3]) -> [PixelPoint; 3] {
-    triangle.map(|v| vertices.point(v))
-}
-
-/// Sets up and bins a share's triangles.
-pub(super) fn set_up(share: &mut Share, geometry: Geometry<'_>, grid: Grid, vertices: &Vertices) {
-    share.prepared.clear();
-    share.counts = RasterCounts::default();
-    for triangle in share.triangles(geometry) {
-        share.counts.submitted += 1;
-        set_up_triangle(share, geometry, grid, vertices, triangle);
-    }
-    bin(share, grid);
-}
-
-fn set_up_triangle(
-    share: &mut Share,
-    geometry: Geometry<'_>,
-    grid: Grid,
-    vertices: &Vertices,
-    id: usize,
-) {
-    let world = geometry.world;
-    let triangle = world.triangles[id];
-    let Some(outline) = Outline::new(vertices, triangle) else {
-        share.counts.off_screen += 1;
-        return;
-    };
-    let area = outline.doubled_area();
-    if area < 0 {
-        share.counts.back_facing += 1;
-        return;
-    }
-    let pixels = outline
-        .pixel_box(grid.width, grid.height)
-        .filter(|_| area != 0);
-    let Some(pixels) = pixels else {
-        share.counts.off_screen += 1;
-        return;
-    };
-    share.counts.clipped += u64::from(outline.clipped);
-    share.counts.drawn += 1;
-    let mut depth = TrianglePlanes::new(corners(vertices, triangle)).depth([pixels.x0, pixels.y0]);
-    if world.backs.contains(&(id as u32)) {
-        depth = depth.moved_back();
-    }
-    for corners in outline.fan() {
-        let bounds = PixelBox::of_snapped(&corners, grid.width, grid.height);
-        if let Some(bounds) = bounds.filter(|_| doubled_area(corners) > 0) {
-            share.prepared.push(Prepared {
-                id: id as u32,
-                bounds: bounds.into(),
-                corners,
-                depth,
-            });
-        }
-    }
-}
-
-/// Sorts a share's prepared triangles by the tiles that their boxes touch.
+/// Sorts a share's pieces by the tiles that their boxes touch.
 fn bin(share: &mut Share, grid: Grid) {
     let starts = &mut share.bin_starts;
     starts.clear();
     // Each tile's count goes one place to the right of its start, twice over: after summing up, a place holds its tile's
     // start, which filling then moves on to the end, that is, to the next tile's start.
     starts.resize(grid.len() + 2, 0);
-    for prepared in &share.prepared {
-        for tile in grid.touched(&prepared.bounds) {
+    for piece in &share.pieces {
+        for tile in grid.touched(&piece.bounds) {
             starts[tile + 2] += 1;
         }
     }
@@ -167,8 +442,8 @@ fn bin(share: &mut Share, grid: Grid) {
         starts[i] += starts[i - 1];
     }
     fit(&mut share.bin_entries, starts[starts.len() - 1] as usize, 0);
-    for (index, prepared) in share.prepared.iter().enumerate() {
-        for tile in grid.touched(&prepared.bounds) {
+    for (index, piece) in share.pieces.iter().enumerate() {
+        for tile in grid.touched(&piece.bounds) {
             let next = &mut starts[tile + 1];
             share.bin_entries[*next as usize] = index as u32;
             *next += 1;

@@ -2,67 +2,146 @@
 //!
 //! How they are cut depends on the number of triangles alone, never on the number of threads; and every consumer goes
 //! through the shares in order. So the order of triangles in a tile is always ascending.
+//!
+//! A triangle that is drawn gets a **slot**, a number that says where its share keeps what is known about it: the share in the
+//! upper bits, the place in the lower ones. Slots ascend with ids. Pixels hold slots, because the world's number of a triangle
+//! would have to be looked up first, in a list as long as the world has triangles.
 
-use super::setup::Prepared;
+use super::setup::{Drawn, Piece};
 use crate::backend::{Geometry, RasterCounts};
+use crate::geometry::screen::DepthPlane;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Fewest triangles of a share, but for the last: enough work to be worth a task.
-const SMALLEST_SHARE: u64 = 1024;
+const SMALLEST_SHARE: u64 = 512;
 /// Most shares: each costs every tile a look into its bins.
 const MOST_SHARES: u64 = 64;
+
+/// Bits of a slot that hold the place: with at most 64 shares of less than `2^32` triangles, no share has more.
+const PLACE_BITS: u32 = 26;
+
+/// Set in a triangle's count of pixels if several tiles may add to it.
+const IN_SEVERAL_TILES: u32 = 1 << 31;
 
 /// Some consecutive visible triangles, and what set-up makes of them.
 #[derive(Debug, Default)]
 pub(super) struct Share {
+    /// Its number.
+    index: u32,
     /// The range in `Geometry::visible` that holds the first triangle.
     range: usize,
     /// Triangles of that range that belong to earlier shares.
     skip: u64,
     /// Number of triangles.
     count: u64,
-    /// Triangles to be drawn, ascending by id.
-    pub prepared: Vec<Prepared>,
+    /// Triangles to be drawn, ascending by id, each at its place.
+    pub drawn: Vec<Drawn>,
+    /// How many pixels each of them owns, once the tiles have been drawn; and [`IN_SEVERAL_TILES`].
+    pixels: Vec<AtomicU32>,
+    /// Ids of those of them that own pixels, ascending.
+    pub visible: Vec<u32>,
+    /// What to draw of them: each as a whole, or what clipping left.
+    pub pieces: Vec<Piece>,
     /// Where each tile's entries in `bin_entries` start, and where the last one's end.
     pub bin_starts: Vec<u32>,
-    /// Indices into `prepared`, tile by tile, ascending in each.
+    /// Indices into `pieces`, tile by tile, ascending in each.
     pub bin_entries: Vec<u32>,
     /// What was counted.
     pub counts: RasterCounts,
 }
 
 impl Share {
-    fn with_room(triangles: usize) -> Self {
+    fn with_room(index: usize, triangles: usize) -> Self {
         Self {
-            prepared: Vec::with_capacity(triangles),
+            index: index as u32,
+            drawn: Vec::with_capacity(triangles),
+            pixels: Vec::with_capacity(triangles),
+            visible: Vec::with_capacity(triangles),
+            pieces: Vec::with_capacity(triangles),
             ..Self::default()
         }
     }
 
-    /// The ids of its triangles, ascending.
+    /// The ids of its triangles, ascending, as ranges that are not empty.
     #[inline]
-    pub(super) fn triangles<'a>(
+    pub(super) fn ranges<'a>(
         &self,
         geometry: Geometry<'a>,
-    ) -> impl Iterator<Item = usize> + use<'a> {
+    ) -> impl Iterator<Item = Range<usize>> + use<'a> {
         let (mut skip, mut left) = (self.skip, self.count);
         geometry.visible[self.range..]
             .iter()
-            .flat_map(move |range| {
+            .map_while(move |range| {
                 let start = u64::from(range.start) + skip;
                 let end = u64::from(range.end).min(start + left).max(start);
+                let is_needed = left > 0;
                 (skip, left) = (0, left - (end - start));
-                start as usize..end as usize
+                is_needed.then_some(start as usize..end as usize)
             })
+            .filter(|range| !range.is_empty())
     }
 
-    /// The triangles in a tile's bin.
+    /// Forgets what the last image made of its triangles.
+    pub(super) fn clear(&mut self) {
+        self.drawn.clear();
+        self.pixels.clear();
+        self.pieces.clear();
+        self.counts = RasterCounts::default();
+    }
+
+    /// Puts a triangle at the next place, and returns its slot.
+    #[inline(always)]
+    pub(super) fn push(&mut self, drawn: Drawn) -> u32 {
+        let slot = self.index << PLACE_BITS | self.drawn.len() as u32;
+        let count = if drawn.bounds.is_in_one_tile() {
+            0
+        } else {
+            IN_SEVERAL_TILES
+        };
+        self.pixels.push(AtomicU32::new(count));
+        self.drawn.push(drawn);
+        slot
+    }
+
+    /// The pieces in a tile's bin.
     #[inline]
-    pub(super) fn bin(&self, tile: usize) -> impl Iterator<Item = &Prepared> {
+    pub(super) fn bin(&self, tile: usize) -> impl Iterator<Item = &Piece> {
         let (start, end) = (self.bin_starts[tile], self.bin_starts[tile + 1]);
         self.bin_entries[start as usize..end as usize]
             .iter()
-            .map(|&entry| &self.prepared[entry as usize])
+            .map(|&entry| &self.pieces[entry as usize])
+    }
+
+    /// Lists the triangles that own pixels, and notes their slots by their ids.
+    pub(super) fn list_visible(&mut self, slot_of: &[AtomicU32]) {
+        self.visible.clear();
+        let first = self.index << PLACE_BITS;
+        for ((drawn, pixels), slot) in self.drawn.iter().zip(&self.pixels).zip(first..) {
+            if pixels.load(Ordering::Relaxed) & !IN_SEVERAL_TILES > 0 {
+                self.visible.push(drawn.id);
+                slot_of[drawn.id as usize].store(slot, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
+/// The place of a slot in its share.
+#[inline(always)]
+fn place(slot: u32) -> usize {
+    (slot & ((1 << PLACE_BITS) - 1)) as usize
+}
+
+/// Adds to the number of pixels of a triangle; several tiles may do so at the same time.
+#[inline(always)]
+pub(super) fn add_pixels(shares: &[Share], slot: u32, pixels: u32) {
+    let count = &shares[(slot >> PLACE_BITS) as usize].pixels[place(slot)];
+    let known = count.load(Ordering::Relaxed);
+    if known & IN_SEVERAL_TILES == 0 {
+        // Nobody else does, so the cost of an atomic addition is saved.
+        count.store(known + pixels, Ordering::Relaxed);
+    } else {
+        count.fetch_add(pixels, Ordering::Relaxed);
     }
 }
 
@@ -82,7 +161,9 @@ impl Shares {
         if self.all.len() < self.used {
             // As many as any view's triangles may take, clipping aside, so that the next view does not need more.
             let room = share_size(geometry.world.triangles.len() as u64) as usize;
-            self.all.resize_with(self.used, || Share::with_room(room));
+            for index in self.all.len()..self.used {
+                self.all.push(Share::with_room(index, room));
+            }
         }
         cut_into(&mut self.all[..self.used], geometry, size, total);
     }
@@ -90,6 +171,31 @@ impl Shares {
     /// Those of the current image, in the order of their triangles.
     pub(super) fn used(&self) -> &[Share] {
         &self.all[..self.used]
+    }
+
+    /// The triangle that has a slot.
+    #[inline(always)]
+    pub(super) fn drawn(&self, slot: u32) -> &Drawn {
+        &self.all[(slot >> PLACE_BITS) as usize].drawn[place(slot)]
+    }
+
+    /// The depth of the triangle that has a slot.
+    pub(super) fn depth(&self, slot: u32) -> DepthPlane {
+        let pieces = &self.all[(slot >> PLACE_BITS) as usize].pieces;
+        // They ascend by slots, and those of one triangle agree.
+        pieces[pieces.partition_point(|piece| piece.slot < slot)].depth
+    }
+
+    /// The drawn triangle `id`, whose slot was `slot` when it was last visible, and the pixels it owns; `None` if it owns
+    /// none now.
+    pub(super) fn visible(&self, id: u32, slot: u32) -> Option<(&Drawn, u32)> {
+        let share = self.used().get((slot >> PLACE_BITS) as usize)?;
+        let drawn = share
+            .drawn
+            .get(place(slot))
+            .filter(|drawn| drawn.id == id)?;
+        let pixels = share.pixels[place(slot)].load(Ordering::Relaxed) & !IN_SEVERAL_TILES;
+        (pixels > 0).then_some((drawn, pixels))
     }
 
     /// The same to be worked on.
@@ -165,7 +271,11 @@ mod tests {
             shares.cut(geometry);
             let used = shares.used();
             assert!(used.len() as u64 <= MOST_SHARES);
-            let got: Vec<_> = used.iter().flat_map(|s| s.triangles(geometry)).collect();
+            let got: Vec<_> = used
+                .iter()
+                .flat_map(|s| s.ranges(geometry))
+                .flatten()
+                .collect();
             let want: Vec<_> = visible
                 .iter()
                 .cloned()

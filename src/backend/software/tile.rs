@@ -1,10 +1,17 @@
-//! The image in tiles of 64 x 64 pixels, each a block of memory of its own.
+//! The image in tiles of 64 x 64 pixels, each a block of memory of its own, and each of 16 x 16 blocks of 4 x 4 pixels.
 //!
 //! A pass hands every tile to exactly one thread as `&mut Tile`, so pixels need neither locks nor atomics and results
-//! cannot depend on how many threads there are. A tile's ids and depths (32 KiB) fit the first-level cache of
-//! current processors while its triangles are drawn. Rows are 64 pixels at every SIMD level, so that no vector of up to 16
-//! lanes, started at a multiple of its width, leaves its row. Tiles at the right and the bottom may hang over
-//! the image; their pixels outside never get a triangle.
+//! cannot depend on how many threads there are.
+//!
+//! **Blocks.** The 16 pixels of a block are consecutive in memory, row by row: one vector of the widest level, a whole number of
+//! vectors at the others, and one cache line. Most triangles of a fine mesh are a few pixels wide *and* a few high. They touch one
+//! to four blocks, where they would touch as many vectors as they have rows if vectors ran along rows.
+//!
+//! **What is kept.** Ids and colours persist from pass to pass. Depths do not: while a tile's triangles are drawn they live on
+//! the drawing thread's stack, in its first-level cache, and never go to memory. Sets of blocks say where there is anything at all:
+//! a block that shows nothing but background, and did so before, is not touched again.
+//!
+//! Tiles at the right and the bottom may hang over the image; their pixels outside never get a triangle.
 
 use crate::geometry::screen::MAX_IMAGE_SIDE;
 
@@ -15,30 +22,78 @@ pub(super) const TILE_PIXELS: usize = TILE_SIDE * TILE_SIDE;
 /// `log2` of [`TILE_SIDE`].
 const TILE_BITS: u32 = TILE_SIDE.trailing_zeros();
 
+/// Width and height of a block in pixels.
+pub(super) const BLOCK_SIDE: usize = 4;
+/// Pixels of a block.
+pub(super) const BLOCK_PIXELS: usize = BLOCK_SIDE * BLOCK_SIDE;
+/// Blocks side by side in a tile.
+pub(super) const BLOCKS_ACROSS: usize = TILE_SIDE / BLOCK_SIDE;
+
 /// The id of a pixel that no triangle covers.
 pub const NO_TRIANGLE: u32 = u32::MAX;
 
-/// The stored depth of a pixel that no triangle covers: behind everything, even the far plane (0), so that one comparison
+/// The depth of a pixel that no triangle covers: behind everything, even the far plane (0), so that one comparison
 /// decides.
 pub(super) const NO_DEPTH: f32 = -1.0;
 
-/// Consecutive pixels of a tile with the same triangle.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
-    /// The triangle.
-    pub id: u32,
-    /// How many pixels.
-    pub pixels: u32,
+/// Where the pixel in column `x` and row `y` of a tile is in the tile's arrays.
+#[inline(always)]
+pub(super) fn pixel_index(x: usize, y: usize) -> usize {
+    let block = y / BLOCK_SIDE * BLOCKS_ACROSS + x / BLOCK_SIDE;
+    block * BLOCK_PIXELS + y % BLOCK_SIDE * BLOCK_SIDE + x % BLOCK_SIDE
 }
 
-/// 64 x 64 pixels, rows from the top.
+/// The column and row of a block's first pixel in its tile.
+#[inline(always)]
+pub(super) fn block_corner(block: usize) -> [i32; 2] {
+    let (column, row) = (block % BLOCKS_ACROSS, block / BLOCKS_ACROSS);
+    [(column * BLOCK_SIDE) as i32, (row * BLOCK_SIDE) as i32]
+}
+
+/// Some of a tile's blocks, one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct BlockSet([u64; 4]);
+
+impl BlockSet {
+    /// Adds a block.
+    #[inline(always)]
+    pub(super) fn insert(&mut self, block: usize) {
+        self.0[block / 64 % 4] |= 1 << (block % 64);
+    }
+
+    /// True when no block is in the set.
+    #[inline]
+    pub(super) fn is_empty(self) -> bool {
+        self.0 == [0; 4]
+    }
+
+    /// Blocks of this set that are not in the other.
+    #[inline]
+    pub(super) fn without(self, other: Self) -> Self {
+        Self(std::array::from_fn(|word| self.0[word] & !other.0[word]))
+    }
+
+    /// The blocks, ascending.
+    #[inline]
+    pub(super) fn iter(self) -> impl Iterator<Item = usize> {
+        self.0.into_iter().enumerate().flat_map(|(word, mut left)| {
+            std::iter::from_fn(move || {
+                let bit = left.trailing_zeros() as usize;
+                (left != 0).then(|| {
+                    left &= left - 1;
+                    word * 64 + bit
+                })
+            })
+        })
+    }
+}
+
+/// 64 x 64 pixels, block after block.
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct Tile {
-    /// The triangle that owns each pixel, or [`NO_TRIANGLE`].
-    pub id: [u32; TILE_PIXELS],
-    /// Reversed depth of each pixel, or [`NO_DEPTH`].
-    pub depth: [f32; TILE_PIXELS],
+    /// The slot of the triangle that owns each pixel (see [`shares`](super::shares)), or [`NO_TRIANGLE`].
+    pub slot: [u32; TILE_PIXELS],
     /// Encoded colour of each pixel, RGBA from the lowest byte up.
     pub colour: [u32; TILE_PIXELS],
     /// The image pixel in its top left corner.
@@ -49,12 +104,14 @@ pub(super) struct Tile {
     pub height: i32,
     /// Pixels that have a triangle.
     pub covered: u32,
-    /// The colour, if all of `colour` is one colour because nothing was painted since it was filled.
-    pub filled: Option<u32>,
+    /// Blocks in which some pixel has a triangle.
+    pub owned: BlockSet,
+    /// Blocks that may show something else than the background.
+    pub painted: BlockSet,
+    /// The encoded background that all other blocks show; `None` before the first image.
+    pub background: Option<u32>,
     /// The backend's serial number when `colour` changed last.
     pub serial: u64,
-    /// Owners of the pixels in order, background left out.
-    pub runs: Vec<Run>,
 }
 
 impl Tile {
@@ -63,24 +120,27 @@ impl Tile {
         let origin = [(column * TILE_SIDE) as i32, (row * TILE_SIDE) as i32];
         let side = TILE_SIDE as i32;
         Self {
-            id: [NO_TRIANGLE; TILE_PIXELS],
-            depth: [NO_DEPTH; TILE_PIXELS],
+            slot: [NO_TRIANGLE; TILE_PIXELS],
             colour: [0; TILE_PIXELS],
             origin,
             width: side.min(grid.width as i32 - origin[0]),
             height: side.min(grid.height as i32 - origin[1]),
             covered: 0,
-            filled: None,
+            owned: BlockSet::default(),
+            painted: BlockSet::default(),
+            background: None,
             serial,
-            // As many as there can be: a moving view would make every tile's list grow time and again.
-            runs: Vec::with_capacity(TILE_PIXELS),
         }
     }
 
     /// Takes all triangles off.
     pub(super) fn clear(&mut self) {
-        self.id.fill(NO_TRIANGLE);
-        self.depth.fill(NO_DEPTH);
+        for block in self.owned.iter() {
+            let at = block * BLOCK_PIXELS;
+            self.slot[at..at + BLOCK_PIXELS].fill(NO_TRIANGLE);
+        }
+        self.owned = BlockSet::default();
+        self.covered = 0;
     }
 
     /// Pixels inside the image.
@@ -88,7 +148,6 @@ impl Tile {
         self.width as u64 * self.height as u64
     }
 }
-
 /// How an image is cut into tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Grid {
@@ -159,6 +218,12 @@ impl Bounds {
     /// The top left pixel.
     pub(super) fn anchor(&self) -> [i32; 2] {
         [i32::from(self.x0), i32::from(self.y0)]
+    }
+
+    /// Whether all pixels are in the same tile.
+    #[inline(always)]
+    pub(super) fn is_in_one_tile(&self) -> bool {
+        (self.x0 >> TILE_BITS, self.y0 >> TILE_BITS) == (self.x1 >> TILE_BITS, self.y1 >> TILE_BITS)
     }
 
     /// The pixels inside a tile, counted from its corner; it must be one that the box touches.

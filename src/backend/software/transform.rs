@@ -4,6 +4,9 @@
 //! such blocks either wholly used or wholly unused for the most part. Within a block the same scalar rules
 //! ([`transform_point`](crate::math::transform_point), [`outcode`], [`snap`]) run over arrays of fixed length, which the compiler
 //! turns into vectors of the dispatched level; each operation is rounded by itself, so the bits are the same at all levels.
+//!
+//! What comes out is stored vertex by vertex, since set-up picks vertices one at a time: what every submitted triangle needs of
+//! its corners apart from what only those need that are drawn.
 
 use super::shares::Share;
 use crate::backend::Geometry;
@@ -18,22 +21,30 @@ const BLOCK: usize = 16;
 /// Blocks that one task transforms: about 10 microseconds.
 const BLOCKS_PER_TASK: usize = 64;
 
-/// [`BLOCK`] consecutive vertices, one array per component.
+/// A vertex on the sub-pixel grid.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SnappedVertex {
+    /// Where; valid if the outcode is zero.
+    pub position: [i32; 2],
+    /// Clipping planes that the vertex is outside of.
+    pub outcode: u32,
+}
+
+/// [`BLOCK`] consecutive vertices.
 #[derive(Clone, Debug)]
 struct VertexBlock {
+    snapped: [SnappedVertex; BLOCK],
     /// Homogeneous pixel space.
-    point: [[f64; BLOCK]; 4],
-    /// Sub-pixel grid; valid where the outcode is zero.
-    snapped: [[i32; BLOCK]; 2],
-    /// Clipping planes that the vertex is outside of.
-    outcode: [u8; BLOCK],
+    point: [PixelPoint; BLOCK],
 }
 
 impl VertexBlock {
     const EMPTY: Self = Self {
-        point: [[0.0; BLOCK]; 4],
-        snapped: [[0; BLOCK]; 2],
-        outcode: [u8::MAX; BLOCK],
+        snapped: [SnappedVertex {
+            position: [0; 2],
+            outcode: u32::MAX,
+        }; BLOCK],
+        point: [[0.0; 4]; BLOCK],
     };
 }
 
@@ -53,9 +64,13 @@ impl Vertices {
         self.wanted.resize_with(count, AtomicBool::default);
         let wanted = &self.wanted;
         exec.for_each_chunk(shares, 1, |_, share| {
-            for triangle in share[0].triangles(geometry) {
-                for vertex in geometry.world.triangles[triangle] {
-                    wanted[vertex as usize / BLOCK].store(true, Ordering::Relaxed);
+            for range in share[0].ranges(geometry) {
+                for &vertex in geometry.world.triangles[range].as_flattened() {
+                    let flag = &wanted[vertex as usize / BLOCK];
+                    // Looking first keeps the cache line shared between threads.
+                    if !flag.load(Ordering::Relaxed) {
+                        flag.store(true, Ordering::Relaxed);
+                    }
                 }
             }
         });
@@ -72,35 +87,15 @@ impl Vertices {
     }
 
     /// A vertex in homogeneous pixel space.
-    #[inline]
+    #[inline(always)]
     pub(super) fn point(&self, vertex: u32) -> PixelPoint {
-        let (block, i) = self.locate(vertex);
-        [
-            block.point[0][i],
-            block.point[1][i],
-            block.point[2][i],
-            block.point[3][i],
-        ]
+        self.blocks[vertex as usize / BLOCK].point[vertex as usize % BLOCK]
     }
 
-    /// A vertex on the sub-pixel grid, if its outcode is zero.
-    #[inline]
-    pub(super) fn snapped(&self, vertex: u32) -> [i32; 2] {
-        let (block, i) = self.locate(vertex);
-        [block.snapped[0][i], block.snapped[1][i]]
-    }
-
-    /// The clipping planes that a vertex is outside of.
-    #[inline]
-    pub(super) fn outcode(&self, vertex: u32) -> u8 {
-        let (block, i) = self.locate(vertex);
-        block.outcode[i]
-    }
-
-    #[inline]
-    fn locate(&self, vertex: u32) -> (&VertexBlock, usize) {
-        let vertex = vertex as usize;
-        (&self.blocks[vertex / BLOCK], vertex % BLOCK)
+    /// A vertex on the sub-pixel grid.
+    #[inline(always)]
+    pub(super) fn snapped(&self, vertex: u32) -> SnappedVertex {
+        self.blocks[vertex as usize / BLOCK].snapped[vertex as usize % BLOCK]
     }
 }
 
@@ -117,20 +112,25 @@ fn transform_block<S: Simd>(
     x[..used].copy_from_slice(&positions.x[first..first + used]);
     y[..used].copy_from_slice(&positions.y[first..first + used]);
     z[..used].copy_from_slice(&positions.z[first..first + used]);
+    let mut point = [[0.0; BLOCK]; 4];
     for i in 0..BLOCK {
         let p = geometry.view.project([x[i], y[i], z[i]]);
-        for (component, value) in block.point.iter_mut().zip(p) {
+        for (component, value) in point.iter_mut().zip(p) {
             component[i] = value;
         }
     }
+    let mut codes = [0; BLOCK];
+    let mut snapped = [[0; BLOCK]; 2];
     for i in 0..BLOCK {
-        let p = [
-            block.point[0][i],
-            block.point[1][i],
-            block.point[2][i],
-            block.point[3][i],
-        ];
-        block.outcode[i] = outcode(p);
-        [block.snapped[0][i], block.snapped[1][i]] = snap(p);
+        let p = [point[0][i], point[1][i], point[2][i], point[3][i]];
+        codes[i] = outcode(p);
+        [snapped[0][i], snapped[1][i]] = snap(p);
+    }
+    for i in 0..BLOCK {
+        block.point[i] = [point[0][i], point[1][i], point[2][i], point[3][i]];
+        block.snapped[i] = SnappedVertex {
+            position: [snapped[0][i], snapped[1][i]],
+            outcode: u32::from(codes[i]),
+        };
     }
 }
