@@ -20,6 +20,7 @@ use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
 use crate::geometry::screen::Interpolator;
 use crate::illumination::ShadingKit;
+use crate::output::Encoding;
 use crate::output::encode::encode_lanes;
 use crate::parallel::Exec;
 use crate::simd::{Simd, dispatch};
@@ -228,7 +229,14 @@ fn paint_patch<S: Simd>(
     while place.y <= place.last_y {
         let batch = &mut work.batch;
         batch.collect(simd, tile, patch.triangle, &work.rows, &mut place);
-        painted += batch.colour(simd, tile.origin, &owner.planes, edges.as_ref(), fill);
+        painted += batch.colour(
+            simd,
+            painter.geometry.view.encoding,
+            tile.origin,
+            &owner.planes,
+            edges.as_ref(),
+            fill,
+        );
         changed |= batch.put_back(simd, tile);
     }
     if changed.any_true() {
@@ -332,6 +340,7 @@ impl Batch {
     fn colour<S: Simd>(
         &mut self,
         simd: S,
+        encoding: Encoding,
         origin: [i32; 2],
         planes: &Interpolator,
         edges: Option<&PatchEdges>,
@@ -355,7 +364,7 @@ impl Batch {
             let mut colour = S::u32s::splat(simd, NOT_PAINTED);
             // Rare, except where the slack says nothing and a large triangle is searched for a small patch.
             if bits != 0 {
-                colour = mask.select(encode_lanes(simd, fill.colours(simd, w)), colour);
+                colour = mask.select(encode_lanes(simd, encoding, fill.colours(simd, w)), colour);
             }
             colour.store_slice(&mut self.colour[at..at + lanes]);
             painted += bits.count_ones();

@@ -59,7 +59,9 @@ pub(super) fn resolve_tile<S: Simd>(
 ) {
     let background = splat3(simd, painter.world().background);
     if tile.covered == 0 {
-        fill(tile, encode_lanes(simd, background)[0], painter.serial);
+        let encoding = painter.geometry.view.encoding;
+        let colour = encode_lanes(simd, encoding, background)[0];
+        fill(tile, colour, painter.serial);
         return;
     }
     match paint {
@@ -135,7 +137,8 @@ fn paint_tile<S: Simd>(
 ) {
     let lanes = S::u32s::LEN;
     let background = splat3(simd, painter.world().background);
-    let encoded_background = encode_lanes(simd, background);
+    let encoding = painter.geometry.view.encoding;
+    let encoded_background = encode_lanes(simd, encoding, background);
     let mut changed = S::mask32s::splat(simd, false);
     for y in 0..tile.height {
         for x in (0..tile.width).step_by(lanes) {
@@ -152,7 +155,7 @@ fn paint_tile<S: Simd>(
                     pixel: [tile.origin[0] + x, tile.origin[1] + y],
                 };
                 let linear = surface.colours(simd, owners, covered, background);
-                encode_lanes(simd, linear)
+                encode_lanes(simd, encoding, linear)
             };
             let stored = &mut tile.colour[at..at + lanes];
             changed |= colour.simd_ne(S::u32s::from_slice(simd, stored));
