@@ -2,6 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use specula::highlight::{SignBits, compute_signs, light_masks};
+use specula::output::Encoding;
 use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, World};
 use specula::simd::SimdLevel;
 use std::hint::black_box;
@@ -65,7 +66,12 @@ fn classification(c: &mut Criterion) {
             group.bench_function(BenchmarkId::new(name, count), |b| {
                 b.iter(|| {
                     for triangle in 0..triangles {
-                        black_box(light_masks(black_box(&world), &eye, triangle as u32));
+                        black_box(light_masks(
+                            black_box(&world),
+                            &eye,
+                            Encoding::Srgb,
+                            triangle as u32,
+                        ));
                     }
                 });
             });

@@ -4,6 +4,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use fearless_simd::prelude::*;
 use specula::geometry::Vec3s;
 use specula::illumination::{ActiveLights, ShadingKit, shade_points};
+use specula::output::Encoding;
 use specula::output::encode::encode_lanes;
 use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial};
 use specula::simd::{Simd, SimdLevel, dispatch};
@@ -66,7 +67,7 @@ fn shading(c: &mut Criterion) {
 }
 
 #[inline(always)]
-fn encode_all<S: Simd>(simd: S, rgb: &Vec3s, out: &mut [u32]) {
+fn encode_all<S: Simd>(simd: S, encoding: Encoding, rgb: &Vec3s, out: &mut [u32]) {
     for (index, chunk) in out.chunks_exact_mut(S::f32s::LEN).enumerate() {
         let at = index * S::f32s::LEN;
         let end = at + S::f32s::LEN;
@@ -75,7 +76,7 @@ fn encode_all<S: Simd>(simd: S, rgb: &Vec3s, out: &mut [u32]) {
             S::f32s::from_slice(simd, &rgb.y[at..end]),
             S::f32s::from_slice(simd, &rgb.z[at..end]),
         ];
-        encode_lanes(simd, lanes).store_slice(chunk);
+        encode_lanes(simd, encoding, lanes).store_slice(chunk);
     }
 }
 
@@ -86,13 +87,15 @@ fn encoding(c: &mut Criterion) {
     group.throughput(Throughput::Elements(POINTS as u64));
     for level in SimdLevel::available() {
         let Some(token) = level.token() else { continue };
-        group.bench_function(level.name(), |b| {
-            b.iter(|| {
-                let rgb = black_box(&rgb);
-                dispatch!(token, simd => encode_all(simd, rgb, &mut out));
-                black_box(&mut out);
+        for encoding in Encoding::ALL {
+            group.bench_function(BenchmarkId::new(encoding.name(), level.name()), |b| {
+                b.iter(|| {
+                    let (rgb, encoding) = black_box((&rgb, encoding));
+                    dispatch!(token, simd => encode_all(simd, encoding, rgb, &mut out));
+                    black_box(&mut out);
+                });
             });
-        });
+        }
     }
     group.finish();
 }

@@ -227,7 +227,12 @@ impl Bench {
         let triangles = backend.visible_triangles();
         let ns = self.median_ns(|| {
             for &triangle in triangles {
-                std::hint::black_box(light_masks(&self.world, &self.view.eye, triangle));
+                std::hint::black_box(light_masks(
+                    &self.world,
+                    &self.view.eye,
+                    self.view.encoding,
+                    triangle,
+                ));
             }
         });
         ns / triangles.len() as f64
@@ -247,12 +252,12 @@ impl Bench {
             for &triangle in &triangles {
                 forest.plant(&self.world, &self.colours, triangle, 100);
             }
-            let (world, eye) = (&self.world, self.view.eye);
-            forest.illuminate(self.exec, world, eye, &self.colours, &mut planted);
+            let (world, view) = (&self.world, &self.view);
+            forest.illuminate(self.exec, world, view, &self.colours, &mut planted);
             for &leaf in &planted {
                 forest.plan_split(world, &self.colours, leaf, 7, |t| backend.visible_pixels(t));
             }
-            forest.illuminate(self.exec, world, eye, &self.colours, &mut Vec::new());
+            forest.illuminate(self.exec, world, view, &self.colours, &mut Vec::new());
             forest.conclude_splits(world, &mut outcomes);
             leaves = forest.open_leaves();
         });

@@ -41,6 +41,38 @@ impl Exec {
         }
     }
 
+    /// As [`for_each_chunk`](Self::for_each_chunk), over three lists of the same length at once.
+    pub fn for_each_chunk3<T: Send>(
+        &self,
+        [a, b, c]: [&mut [T]; 3],
+        size: usize,
+        f: impl Fn(usize, [&mut [T]; 3]) + Send + Sync,
+    ) {
+        use rayon::prelude::*;
+        if self.threads > 1 && a.len() > size {
+            let others = b.par_chunks_mut(size).zip(c.par_chunks_mut(size));
+            a.par_chunks_mut(size)
+                .zip(others)
+                .enumerate()
+                .for_each(|(index, (a, (b, c)))| f(index, [a, b, c]));
+        } else {
+            let others = b.chunks_mut(size).zip(c.chunks_mut(size));
+            for (index, (a, (b, c))) in a.chunks_mut(size).zip(others).enumerate() {
+                f(index, [a, b, c]);
+            }
+        }
+    }
+
+    /// Runs `f(index)` for every index below `count`, in parallel if there are threads for it.
+    pub fn for_each_index(&self, count: usize, f: impl Fn(usize) + Send + Sync) {
+        use rayon::prelude::*;
+        if self.threads > 1 && count > 1 {
+            (0..count).into_par_iter().for_each(f);
+        } else {
+            (0..count).for_each(f);
+        }
+    }
+
     /// Runs both closures, in parallel if there are threads for it.
     pub fn join<A: Send, B: Send>(
         &self,

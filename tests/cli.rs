@@ -93,6 +93,16 @@ fn bad_usage_and_bad_input_end_with_status_2_and_failures_with_1() {
         (render(&["--threads", "0"]), 2, "from 1"),
         (render(&["--threads", "100000"]), 2, "1024"),
         (render(&["--method", "magic"]), 2, "phong-area"),
+        (
+            render(&["--encoding", "gamma"]),
+            2,
+            "no encoding is called 'gamma'; there are srgb, linear",
+        ),
+        (
+            animate("a.apng", &["--encoding", "linear"]),
+            2,
+            "--encoding",
+        ),
         (render(&["--simd", "mmx"]), 2, "scalar"),
         (render(&["--time", "-1"]), 2, "seconds"),
         (render(&["--time", "nan"]), 2, "seconds"),
@@ -760,4 +770,49 @@ fn the_backend_is_chosen_by_name() {
     assert_success(&run(
         "sweep teapot.ron --backend skia --methods adaptive --budgets 1 --size 64x36",
     ));
+}
+
+#[test]
+fn a_linear_image_is_tagged_and_measured_as_such() {
+    let directory = workplace();
+    let place = directory.path();
+    let mut bytes = Vec::new();
+    for encoding in ["srgb", "linear"] {
+        let arguments = format!(
+            "render teapot.ron -o {encoding}.png --encoding {encoding} --size 96x54 --json --error"
+        );
+        let output = specula(place, &arguments.split(' ').collect::<Vec<_>>());
+        assert_success(&output);
+        let [frame] = &json_lines(&output)[..] else {
+            panic!("one frame: {}", text(&output.stdout));
+        };
+        let worst = frame["error"]["max"].as_u64();
+        assert!(worst <= Some(1), "{encoding}: {frame}");
+
+        let path = place.join(format!("{encoding}.png"));
+        let file = std::io::BufReader::new(fs::File::open(&path).expect("written"));
+        let reader = png::Decoder::new(file).read_info().expect("a PNG file");
+        let info = reader.info();
+        let gamma = info.gama_chunk.map(png::ScaledFloat::into_value);
+        let is_linear = encoding == "linear";
+        assert_eq!(info.srgb.is_none(), is_linear);
+        assert_eq!(gamma == Some(1.0), is_linear, "{gamma:?}");
+        bytes.push(images(&path));
+    }
+    // Stored linearly, all but black and white is darker.
+    let (srgb, linear) = (bytes[0].concat(), bytes[1].concat());
+    assert!(srgb != linear && srgb.iter().zip(&linear).all(|(s, l)| s >= l));
+
+    // What is drawn over an image is sRGB.
+    let inspect = "inspect teapot.ron --encoding linear --size 96x54 --overlay overlay.png";
+    assert_success(&specula(place, &inspect.split(' ').collect::<Vec<_>>()));
+    let file = std::io::BufReader::new(fs::File::open(place.join("overlay.png")).expect("written"));
+    let reader = png::Decoder::new(file).read_info().expect("a PNG file");
+    assert!(reader.info().srgb.is_some());
+
+    let bench = "bench teapot.ron --encoding linear --size 64x36 --views 2 --error 2 --json";
+    let output = specula(place, &bench.split(' ').collect::<Vec<_>>());
+    assert_success(&output);
+    let rmse = json_lines(&output)[0]["rmse"].as_f64();
+    assert!(rmse < Some(0.5), "{rmse:?}");
 }

@@ -5,7 +5,7 @@ use specula::geometry::Vec3s;
 use specula::highlight::{SignBits, TriangleBound, Verdict, compute_signs, light_masks, masks_of};
 use specula::illumination::reference::{Factors, factors, shade, vector};
 use specula::illumination::{ActiveLights, ShadingKit, shade_points};
-use specula::output::encode::encode;
+use specula::output::Encoding;
 use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, World};
 use specula::simd::SimdLevel;
 
@@ -207,7 +207,12 @@ fn factors_stay_in_their_intervals() {
 /// Per pixel with the masks, and the remainder interpolated, is within half a code of everything per pixel.
 #[test]
 fn what_masks_leave_out_is_not_seen() {
+    Encoding::ALL.into_iter().for_each(check_masks);
+}
+
+fn check_masks(encoding: Encoding) {
     let mut random = Random(12);
+    let encode = |light| encoding.encode(light);
     let (mut left_out, mut terms, mut worst) = (0, 0, 0.0_f64);
     for round in 0..12_000 {
         let count = [1, 4, 16, 40][round % 4] / if round % 8 < 4 { 1 } else { 4 };
@@ -216,6 +221,7 @@ fn what_masks_leave_out_is_not_seen() {
             case.positions,
             case.normals,
             &case.eye,
+            encoding,
             &case.material,
             &case.lights,
         );
@@ -257,7 +263,7 @@ fn what_masks_leave_out_is_not_seen() {
             }
         }
     }
-    println!("left out {left_out} of {terms} terms, worst error {worst} codes");
+    println!("{encoding}: left out {left_out} of {terms} terms, worst error {worst} codes");
     assert!(worst <= 0.5 + 1e-6, "{worst} codes");
     assert!(left_out * 10 > terms, "{left_out} of {terms}");
     assert!(
@@ -269,9 +275,15 @@ fn what_masks_leave_out_is_not_seen() {
 /// The same as a backend does it: positions, normals and the remainder interpolated in `f32`, terms evaluated in lanes.
 #[test]
 fn what_masks_leave_out_is_not_seen_in_single_precision_either() {
+    let check = check_masks_in_single_precision;
+    Encoding::ALL.into_iter().for_each(check);
+}
+
+fn check_masks_in_single_precision(encoding: Encoding) {
     const PIXELS: usize = 29;
     let mut random = Random(15);
     let level = SimdLevel::detect().token().expect("detected");
+    let encode = |light| encoding.encode(light);
     let (mut compared, mut worst) = (0, 0.0_f64);
     for round in 0..6_000 {
         let case = random_case(&mut random, [1, 3, 9][round % 3]);
@@ -283,6 +295,7 @@ fn what_masks_leave_out_is_not_seen_in_single_precision_either() {
             case.positions,
             case.normals,
             &case.eye,
+            encoding,
             &case.material,
             &case.lights,
         )
@@ -330,7 +343,7 @@ fn what_masks_leave_out_is_not_seen_in_single_precision_either() {
             }
         }
     }
-    println!("worst error {worst} codes at {compared} pixels");
+    println!("{encoding}: worst error {worst} codes at {compared} pixels");
     assert!(worst <= 0.55 && compared > 100_000, "{worst}, {compared}");
 }
 
@@ -467,7 +480,7 @@ fn masks_find_every_triangle_with_a_visible_specular_deviation() {
                     (case.at(w, 0).specular - interpolated).abs() > 4.0 / 255.0
                 });
                 let by_signs = !bits.pht_lights(corners).is_empty();
-                let by_bound = !light_masks(&world, &eye, triangle as u32)
+                let by_bound = !light_masks(&world, &eye, Encoding::Srgb, triangle as u32)
                     .active
                     .specular
                     .is_empty();
@@ -526,6 +539,7 @@ fn odd_input_gives_the_trivial_answer() {
             case.positions,
             case.normals,
             &case.eye,
+            Encoding::ALL[random.below(2)],
             &case.material,
             &case.lights,
         );

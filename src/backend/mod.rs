@@ -178,7 +178,7 @@ pub enum Fill {
 /// triangles that intersect or overlap cyclically may hide each other wrongly. A pixel that nothing covers shows the
 /// world's background, encoded.
 ///
-/// **Colours.** Pixels are 8-bit sRGB and opaque. Between the corners of a triangle colours are interpolated as declared
+/// **Colours.** Pixels are 8-bit, in the [encoding](View::encoding) of the view, and opaque. Between the corners of a triangle colours are interpolated as declared
 /// by [`Interpolation`], within two codes, rounding included. With ids a patch's colours are interpolated over the
 /// patch.
 ///

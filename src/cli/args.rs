@@ -5,6 +5,7 @@ use clap::Args;
 use specula::BackendKind;
 use specula::frame::{Engine, EngineError, EngineOptions, Method};
 use specula::geometry::screen::MAX_IMAGE_SIDE;
+use specula::output::Encoding;
 use specula::output::timing::MAX_DURATION_S;
 use specula::scene::Scene;
 use specula::schedule::Budget;
@@ -39,10 +40,16 @@ pub(super) struct Machine {
 
 impl Machine {
     /// An engine for `scene` that uses the machine so.
-    pub(super) fn engine(&self, scene: &Scene, method: Method) -> Result<Engine, EngineError> {
+    pub(super) fn engine(
+        &self,
+        scene: &Scene,
+        method: Method,
+        encoding: Encoding,
+    ) -> Result<Engine, EngineError> {
         let options = EngineOptions {
             method,
             backend: self.backend,
+            encoding,
             threads: self.threads,
             simd: self.simd,
             ..EngineOptions::default()

@@ -7,6 +7,7 @@ use super::report::list;
 use clap::Args;
 use specula::frame::Method;
 use specula::measure::{BenchOptions, BenchPhase, BenchReport, bench};
+use specula::output::Encoding;
 use specula::scene::Scene;
 use std::path::PathBuf;
 
@@ -53,6 +54,10 @@ pub(super) struct Bench {
     #[arg(long, value_name = "UNITS", conflicts_with = "budget")]
     work: Option<u64>,
 
+    /// How images store light, in codes of which errors are measured: srgb or linear
+    #[arg(long, value_name = "NAME", default_value_t)]
+    encoding: Encoding,
+
     /// How many turns to time; all frames count
     #[arg(long, value_name = "K", default_value = "1", value_parser = limited_count)]
     repeat: u32,
@@ -87,6 +92,7 @@ pub(super) fn run(args: &Bench) -> Result<(), Failure> {
         repeats: args.repeat,
         compared_views: args.error,
         backend: args.machine.backend,
+        encoding: args.encoding,
         threads: args.machine.threads,
         simd: args.machine.simd,
         ..BenchOptions::default()

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use specula::frame::{FrameStats, Method};
 use specula::measure::inspection::{Inspection, MaterialCounts};
 use specula::measure::{Layer, draw_overlay};
-use specula::output::{Frame, png};
+use specula::output::{Encoding, Frame, png};
 use specula::scene::Scene;
 use std::path::PathBuf;
 
@@ -80,6 +80,10 @@ pub(super) struct Inspect {
     #[arg(long, default_value_t)]
     method: Method,
 
+    /// How the image inspected stores light: srgb or linear; an overlay is srgb
+    #[arg(long, value_name = "NAME", default_value_t)]
+    encoding: Encoding,
+
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -97,7 +101,7 @@ pub(super) fn run(args: &Inspect) -> Result<(), Failure> {
     if let Some(seconds) = args.time {
         animate::go_to_time(&mut scene, seconds);
     }
-    let mut engine = args.machine.engine(&scene, args.method)?;
+    let mut engine = args.machine.engine(&scene, args.method, args.encoding)?;
     let size = args.machine.size;
     let mut frame = Frame::new(size.width, size.height);
     let budget = budget(args.budget, args.work);

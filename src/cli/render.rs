@@ -7,7 +7,7 @@ use super::{Failure, animate};
 use clap::Args;
 use specula::frame::{Engine, Method};
 use specula::measure::{ErrorReport, ReferenceImage};
-use specula::output::{Frame, png};
+use specula::output::{Encoding, Frame, png};
 use specula::scene::Scene;
 use std::path::PathBuf;
 
@@ -57,6 +57,10 @@ pub(super) struct Render {
     #[arg(long, default_value_t)]
     method: Method,
 
+    /// How the image stores light: srgb, or linear (codes in proportion to light, for further computation)
+    #[arg(long, value_name = "NAME", default_value_t)]
+    encoding: Encoding,
+
     /// Compare the last frame with the Phong reference (which takes a while)
     #[arg(long)]
     error: bool,
@@ -77,7 +81,7 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
         animate::go_to_time(&mut scene, seconds);
     }
     let size = args.machine.size;
-    let mut engine = args.machine.engine(&scene, args.method)?;
+    let mut engine = args.machine.engine(&scene, args.method, args.encoding)?;
     let mut frame = Frame::new(size.width, size.height);
     let budget = budget(args.budget, args.work);
 
@@ -125,7 +129,9 @@ fn compare(
     let progress = Progress::new(0);
     progress.doing("rendering the Phong reference");
     let world = engine.world();
-    let view = world.view(scene.camera(), frame.width(), frame.height());
+    let view = world
+        .view(scene.camera(), frame.width(), frame.height())
+        .with_encoding(engine.encoding());
     let reference = ReferenceImage::render(world, &view, args.machine.thread_count());
     ErrorReport::compare(frame, &reference).map_err(|error| Failure::runtime(error.to_string()))
 }

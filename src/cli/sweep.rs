@@ -7,6 +7,7 @@ use super::machine::cpu_model;
 use clap::Args;
 use specula::Method;
 use specula::measure::{self, Calibration, SweepBudget, SweepOptions, SweepRow};
+use specula::output::Encoding;
 use specula::output::png::plain_reason;
 use specula::scene::Scene;
 use std::fs::File;
@@ -41,6 +42,10 @@ pub(super) struct Sweep {
         value_parser = method_or_all
     )]
     methods: Vec<MethodOrAll>,
+
+    /// How images store light, in codes of which errors are measured: srgb or linear
+    #[arg(long, value_name = "NAME", default_value_t)]
+    encoding: Encoding,
 
     /// Budgets in milliseconds, separated by commas
     #[arg(
@@ -135,6 +140,7 @@ pub(super) fn run(args: &Sweep) -> Result<(), Failure> {
         repeats: args.repeat,
         threads: args.machine.threads,
         backend: args.machine.backend,
+        encoding: args.encoding,
         simd: args.machine.simd,
         ..SweepOptions::default()
     };

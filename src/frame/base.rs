@@ -5,7 +5,7 @@ use super::stats::FrameStats;
 use crate::backend::{Backend, BasePaint, Geometry, RasterCounts};
 use crate::geometry::Vec3s;
 use crate::highlight::{self, SignBits};
-use crate::illumination::PointBatch;
+use crate::illumination::{PointBatch, VertexSet};
 use crate::parallel::Exec;
 use crate::scene::{View, World};
 use crate::visibility::{CullCounts, Culler};
@@ -19,7 +19,11 @@ pub(super) struct BaseImage {
     /// Linear colours: of vertices, or of triangles if shading is flat. Those of visible triangles are valid.
     colours: Vec3s,
     signs: SignBits,
+    /// Vertices of visible triangles while they are illuminated.
+    corners: VertexSet,
+    /// Centroids, likewise.
     batch: PointBatch,
+    /// Vertices that the sign tests are made at.
     vertices: Vec<u32>,
     /// The image for which a vertex was last put on a list.
     stamp: Vec<u32>,
@@ -40,6 +44,7 @@ impl BaseImage {
             visible: Vec::new(),
             colours: Vec3s::default(),
             signs: SignBits::default(),
+            corners: VertexSet::default(),
             batch: PointBatch::default(),
             vertices: Vec::new(),
             stamp: vec![0; world.positions.len()],
@@ -110,18 +115,9 @@ impl BaseImage {
     }
 
     fn shade_vertices(&mut self, exec: Exec, world: &World, view: &View, backend: &dyn Backend) {
-        self.list_vertices(world, backend.visible_triangles().iter().copied());
-        self.batch.clear();
-        for &vertex in &self.vertices {
-            let v = vertex as usize;
-            let (point, normal) = (world.positions.get(v), world.normals.get(v));
-            self.batch.push(point, normal, world.vertex_material[v]);
-        }
-        self.batch.illuminate(exec, world, view.eye);
-        self.colours.resize(world.positions.len());
-        for (index, &vertex) in self.vertices.iter().enumerate() {
-            self.colours.set(vertex as usize, self.batch.colour(index));
-        }
+        let triangles = backend.visible_triangles();
+        self.corners
+            .illuminate(exec, world, view.eye, triangles, &mut self.colours);
     }
 
     /// One colour per triangle, at its centroid with its geometric normal.

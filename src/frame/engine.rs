@@ -9,7 +9,7 @@ use super::stats::{FrameStats, Outcome, StageTimes};
 use crate::backend::Backend;
 use crate::clock::Clock;
 use crate::geometry::screen::MAX_IMAGE_SIDE;
-use crate::output::{Frame, Stamp, Target};
+use crate::output::{Encoding, Frame, Stamp, Target};
 use crate::parallel::Exec;
 use crate::scene::{GeometryChange, Placement, Scene, View, World};
 use crate::schedule::{Allowance, Budget, LearnedRate, cost};
@@ -43,6 +43,7 @@ pub struct Engine {
 #[derive(Debug)]
 struct Renderer {
     method: Method,
+    encoding: Encoding,
     placement: Placement,
     world: World,
     backend: Box<dyn Backend>,
@@ -122,6 +123,7 @@ impl Engine {
             pool,
             renderer: Renderer {
                 method: options.method,
+                encoding: options.encoding,
                 placement,
                 base: BaseImage::new(&world),
                 world,
@@ -147,6 +149,9 @@ impl Engine {
     /// It never fails: a scene is validated when it is made. A frame with a side of more than [`MAX_IMAGE_SIDE`] pixels is left
     /// as it is.
     pub fn render(&mut self, scene: &Scene, budget: Budget, frame: &mut Frame) -> FrameStats {
+        if frame.width().max(frame.height()) <= MAX_IMAGE_SIDE {
+            frame.set_encoding(self.renderer.encoding);
+        }
         frame.write(|target| self.render_target(scene, budget, target))
     }
 
@@ -212,6 +217,12 @@ impl Engine {
         &self.renderer.world
     }
 
+    /// How images store light.
+    #[must_use]
+    pub fn encoding(&self) -> Encoding {
+        self.renderer.encoding
+    }
+
     /// Threads that the engine uses.
     #[must_use]
     pub fn threads(&self) -> usize {
@@ -235,7 +246,10 @@ impl Renderer {
         // A larger image is none: backends leave a target alone that does not have the view's size.
         let [width, height] =
             [target.width(), target.height()].map(|side| side.min(MAX_IMAGE_SIDE));
-        let view = self.world.view(scene.camera(), width, height);
+        let view = self
+            .world
+            .view(scene.camera(), width, height)
+            .with_encoding(self.encoding);
 
         let is_seen = self.seen == Some(view);
         if !is_seen {

@@ -3,6 +3,7 @@
 use super::Method;
 use crate::backend::{Backend, BackendKind};
 use crate::clock::{Clock, SystemClock};
+use crate::output::Encoding;
 use crate::simd::SimdLevel;
 use std::sync::Arc;
 
@@ -13,6 +14,8 @@ pub struct EngineOptions {
     pub method: Method,
     /// What draws them; [`Engine::with_backend`](super::Engine::with_backend) takes one that is not among these.
     pub backend: BackendKind,
+    /// How images store light.
+    pub encoding: Encoding,
     /// Threads to use; `None` for as many as the machine has processors. With one, everything happens on the caller's
     /// thread; with more, the engine owns a pool.
     pub threads: Option<usize>,
@@ -30,6 +33,7 @@ impl Default for EngineOptions {
         Self {
             method: Method::default(),
             backend: BackendKind::default(),
+            encoding: Encoding::default(),
             threads: None,
             pool: None,
             simd: None,

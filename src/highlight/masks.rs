@@ -9,14 +9,16 @@
 //! ```
 //!
 //! As `encode` is concave, two colours above `lo` that differ by `sum e` differ by at most that in code, and it suffices that
-//! `sum e <= 0.5 / encode'(lo)`. The right hand side is the budget of a channel (unlimited at white). Terms are skipped in the order of the
-//! share of the budget that they take, until it is spent.
+//! `sum e <= 0.5 / encode'(lo)`. The right hand side is the budget of a channel (unlimited at white). It depends on the image's
+//! [`Encoding`]: for a linear one it is half a code of light everywhere, less than for sRGB in bright colours. Terms are skipped in the
+//! order of the share of the budget that they take, until it is spent.
 //!
 //! A term that is absent has `hi = 0` and costs nothing. What [`shade_lanes`](crate::illumination::shade_lanes) itself errs is not part of it.
 
 use super::bound::{LightBound, TriangleBound};
 use super::power::power_below;
 use crate::illumination::{ActiveLights, LightMask, MAX_LIGHTS};
+use crate::output::Encoding;
 use crate::scene::{Eye, ShadingLight, ShadingMaterial, World};
 
 /// What is known of a triangle's highlights.
@@ -55,13 +57,14 @@ impl TriangleLights {
 /// # Panics
 /// When there is no such triangle.
 #[must_use]
-pub fn light_masks(world: &World, eye: &Eye, triangle: u32) -> TriangleLights {
+pub fn light_masks(world: &World, eye: &Eye, encoding: Encoding, triangle: u32) -> TriangleLights {
     let vertices = world.triangles[triangle as usize].map(|vertex| vertex as usize);
     let material = usize::from(world.triangle_material[triangle as usize]);
     masks_of(
         vertices.map(|vertex| world.positions.get(vertex)),
         vertices.map(|vertex| world.normals.get(vertex)),
         eye,
+        encoding,
         &world.materials[material],
         &world.lights,
     )
@@ -75,14 +78,15 @@ pub fn masks_of(
     positions: [[f32; 3]; 3],
     normals: [[f32; 3]; 3],
     eye: &Eye,
+    encoding: Encoding,
     material: &ShadingMaterial,
     lights: &[ShadingLight],
 ) -> TriangleLights {
     // Room for few lights is faster made than for many.
     match lights.len() {
-        0..=8 => masks_with_room::<8>(positions, normals, eye, material, lights),
-        9..=32 => masks_with_room::<32>(positions, normals, eye, material, lights),
-        _ => masks_with_room::<MAX_LIGHTS>(positions, normals, eye, material, lights),
+        0..=8 => masks_with_room::<8>(positions, normals, eye, encoding, material, lights),
+        9..=32 => masks_with_room::<32>(positions, normals, eye, encoding, material, lights),
+        _ => masks_with_room::<MAX_LIGHTS>(positions, normals, eye, encoding, material, lights),
     }
 }
 
@@ -90,6 +94,7 @@ fn masks_with_room<const ROOM: usize>(
     positions: [[f32; 3]; 3],
     normals: [[f32; 3]; 3],
     eye: &Eye,
+    encoding: Encoding,
     material: &ShadingMaterial,
     lights: &[ShadingLight],
 ) -> TriangleLights {
@@ -104,7 +109,7 @@ fn masks_with_room<const ROOM: usize>(
             *lo += diffuse * bound.diffuse.lo + specular * bound.specular.lo;
         }
     }
-    let rates = lo.map(|lo| budget(lo).recip());
+    let rates = lo.map(|lo| budget(encoding, lo).recip());
     let mut terms = [[Term::default(); 2]; ROOM];
     for (index, ((bound, light), pair)) in bounds.iter().zip(lights).zip(&mut terms).enumerate() {
         let shares = |term: usize, deviation: f64| {
@@ -184,31 +189,36 @@ fn spend(terms: &mut [Term]) -> ActiveLights {
 }
 
 /// How much linear light may be added to a channel that is at least `lo`: half a code at the slope there.
-fn budget(lo: f64) -> f64 {
+fn budget(encoding: Encoding, lo: f64) -> f64 {
     const HALF_CODE: f64 = 0.5 / 255.0;
     if lo >= 1.0 {
         // White is clamped.
-        f64::INFINITY
-    } else if lo <= 0.003_130_8 {
-        HALF_CODE / 12.92
-    } else {
+        return f64::INFINITY;
+    }
+    match encoding {
+        Encoding::Linear => HALF_CODE,
+        Encoding::Srgb if lo <= 0.003_130_8 => HALF_CODE / 12.92,
         // encode' = 1.055 / 2.4 x^(-7/12)
-        HALF_CODE * 2.4 / 1.055 * power_below(lo, 7.0 / 12.0)
+        Encoding::Srgb => HALF_CODE * 2.4 / 1.055 * power_below(lo, 7.0 / 12.0),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::encode::encode;
 
     #[test]
     fn the_budget_is_at_most_half_a_code_and_not_much_less() {
-        for i in 0..=1000 {
-            let lo = (f64::from(i) / 1000.0).powi(2) * 0.98;
-            let codes = encode(lo + budget(lo)) - encode(lo);
-            assert!((0.45..=0.500_001).contains(&codes), "{codes} codes at {lo}");
+        for encoding in Encoding::ALL {
+            for i in 0..=1000 {
+                let lo = (f64::from(i) / 1000.0).powi(2) * 0.98;
+                let codes = encoding.encode(lo + budget(encoding, lo)) - encoding.encode(lo);
+                assert!(
+                    (0.45..=0.500_001).contains(&codes),
+                    "{encoding}: {codes} codes at {lo}"
+                );
+            }
+            assert_eq!(budget(encoding, 1.0), f64::INFINITY);
         }
-        assert_eq!(budget(1.0), f64::INFINITY);
     }
 }

@@ -6,8 +6,10 @@ pub mod lights;
 pub mod points;
 pub mod power;
 pub mod reference;
+pub mod vertices;
 
 pub use batch::{shade_points, shade_vertices};
 pub use lanes::{ShadingKit, shade_lanes};
 pub use lights::{ActiveLights, LightMask, MAX_LIGHTS};
 pub use points::{PointBatch, shade_corners};
+pub use vertices::VertexSet;

@@ -18,7 +18,7 @@ use super::reference::ReferenceImage;
 use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
 use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method, StageTimes};
-use crate::output::Frame;
+use crate::output::{Encoding, Frame};
 use crate::scene::{Camera, Scene};
 use crate::schedule::Budget;
 use crate::simd::SimdLevel;
@@ -48,6 +48,8 @@ pub struct BenchOptions {
     pub threads: Option<usize>,
     /// What draws.
     pub backend: BackendKind,
+    /// How images store light; errors are measured in its codes.
+    pub encoding: Encoding,
     /// SIMD level; `None` for the machine's strongest.
     pub simd: Option<SimdLevel>,
     /// Where time comes from.
@@ -66,6 +68,7 @@ impl Default for BenchOptions {
             compared_views: 4,
             threads: None,
             backend: BackendKind::default(),
+            encoding: Encoding::default(),
             simd: None,
             clock: Arc::new(SystemClock::new()),
         }
@@ -184,6 +187,7 @@ pub fn bench(
             method: options.method,
             threads: options.threads,
             backend: options.backend,
+            encoding: options.encoding,
             simd: options.simd,
             clock: Arc::clone(&options.clock),
             ..EngineOptions::default()
@@ -276,7 +280,9 @@ impl Turntable {
         self.render(view);
         let (width, height) = (self.frame.width(), self.frame.height());
         let world = self.engine.world();
-        let view = world.view(self.scene.camera(), width, height);
+        let view = world
+            .view(self.scene.camera(), width, height)
+            .with_encoding(self.engine.encoding());
         let reference = ReferenceImage::render(world, &view, self.engine.threads());
         errors.add_image(&self.frame, &reference);
     }

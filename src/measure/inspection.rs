@@ -140,7 +140,9 @@ impl Inspection {
     #[must_use]
     pub fn new(engine: &Engine, scene: &Scene, stats: &FrameStats, size: [u32; 2]) -> Self {
         let world = engine.world();
-        let view = world.view(scene.camera(), size[0], size[1]);
+        let view = world
+            .view(scene.camera(), size[0], size[1])
+            .with_encoding(engine.encoding());
         let mut leaves = LeafCounts::new(world, scene);
         engine.for_each_leaf(|leaf| leaves.add(world, &view, leaf));
         Self {
@@ -274,7 +276,8 @@ impl LeafCounts {
     fn add_triangle(&mut self, world: &World, view: &View, leaf: &Leaf) {
         let material = usize::from(world.triangle_material[leaf.triangle as usize]);
         self.materials[material].visible_triangles += 1;
-        let verdict = highlight::light_masks(world, &view.eye, leaf.triangle).verdict;
+        let verdict =
+            highlight::light_masks(world, &view.eye, view.encoding, leaf.triangle).verdict;
         match (verdict, leaf.is_pht) {
             (Verdict::Absent, _) => self.verdicts.absent += 1,
             (_, false) => self.verdicts.lobe += 1,

@@ -1,7 +1,7 @@
 //! How far an image is from the reference.
 //!
-//! Differences are taken between encoded 8-bit channels, which are close to uniform for the eye, over the pixels that
-//! the scene covers: background is right by construction and would only dilute the numbers. Pixels on which the
+//! Differences are taken between encoded 8-bit channels (which are close to uniform for the eye where the image is sRGB),
+//! over the pixels that the scene covers: background is right by construction and would only dilute the numbers. Pixels on which the
 //! illumination equation itself jumps ([`ReferenceImage::grazing`]) are left out and counted.
 //!
 //! With `d` ranging over all channels of all compared pixels:
@@ -9,7 +9,7 @@
 //! 99 % of the channels do not exceed. A pixel is off by more than `k` codes when any of its channels is.
 
 use super::ReferenceImage;
-use crate::output::Frame;
+use crate::output::{Encoding, Frame};
 use serde::{Serialize, Serializer};
 
 /// The difference between an image and the reference, in 8-bit codes.
@@ -39,34 +39,56 @@ fn null_if_infinite<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, 
     value.is_finite().then_some(*value).serialize(serializer)
 }
 
-/// Two images of different sizes cannot be compared.
+/// Why an image and a reference cannot be compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("an image of {}x{} pixels cannot be compared with a reference of {}x{}", frame[0], frame[1], reference[0], reference[1])]
-pub struct SizeMismatch {
-    /// Width and height of the image.
-    pub frame: [u32; 2],
-    /// Width and height of the reference.
-    pub reference: [u32; 2],
+#[non_exhaustive]
+pub enum Mismatch {
+    /// They have different sizes.
+    #[error("an image of {}x{} pixels cannot be compared with a reference of {}x{}", frame[0], frame[1], reference[0], reference[1])]
+    Size {
+        /// Width and height of the image.
+        frame: [u32; 2],
+        /// Width and height of the reference.
+        reference: [u32; 2],
+    },
+    /// They store light differently, so that their codes mean different things.
+    #[error("an image stored as {frame} cannot be compared with a reference stored as {reference}")]
+    Encoding {
+        /// That of the image.
+        frame: Encoding,
+        /// That of the reference.
+        reference: Encoding,
+    },
 }
 
 impl ErrorReport {
     /// Compares `frame` with the reference, over the pixels that the scene covers.
     ///
     /// # Errors
-    /// When the sizes differ.
-    pub fn compare(frame: &Frame, reference: &ReferenceImage) -> Result<Self, SizeMismatch> {
-        let sizes = SizeMismatch {
-            frame: [frame.width(), frame.height()],
-            reference: [reference.width, reference.height],
-        };
-        if sizes.frame != sizes.reference {
-            return Err(sizes);
+    /// When the sizes or the encodings differ.
+    pub fn compare(frame: &Frame, reference: &ReferenceImage) -> Result<Self, Mismatch> {
+        let [own, other] = [
+            [frame.width(), frame.height()],
+            [reference.width, reference.height],
+        ];
+        if own != other {
+            return Err(Mismatch::Size {
+                frame: own,
+                reference: other,
+            });
         }
-        Ok(Self::of_same_size(frame, reference))
+        let [own, other] = [frame.encoding(), reference.encoding];
+        if own != other {
+            return Err(Mismatch::Encoding {
+                frame: own,
+                reference: other,
+            });
+        }
+        Ok(Self::of_same_kind(frame, reference))
     }
 
-    /// [`compare`](Self::compare) of images that are known to have the same size.
-    pub(super) fn of_same_size(frame: &Frame, reference: &ReferenceImage) -> Self {
+    /// [`compare`](Self::compare) of images that are known to have the same size and encoding.
+    pub(super) fn of_same_kind(frame: &Frame, reference: &ReferenceImage) -> Self {
         let mut histogram = ErrorHistogram::default();
         histogram.add_image(frame, reference);
         histogram.report()
@@ -94,9 +116,10 @@ impl Default for ErrorHistogram {
 }
 
 impl ErrorHistogram {
-    /// Adds all pixels of an image of the reference's size that the scene covers.
+    /// Adds all pixels of an image of the reference's size and encoding that the scene covers.
     pub(super) fn add_image(&mut self, frame: &Frame, reference: &ReferenceImage) {
         debug_assert_eq!(frame.pixels().len(), reference.pixels.len(), "sizes differ");
+        debug_assert_eq!(frame.encoding(), reference.encoding, "encodings differ");
         for (index, &[r, g, b, _]) in frame.pixels().iter().enumerate() {
             if !reference.is_covered(index) {
                 continue;
@@ -189,6 +212,7 @@ mod tests {
             width,
             height: 1,
             ids: vec![0; len],
+            encoding: Encoding::Srgb,
             pixels: vec![[100; 3]; len],
             codes: vec![[100.0; 3]; len],
             grazing: vec![false; len],
@@ -259,6 +283,17 @@ mod tests {
         frame.pixels_mut()[0] = [0, 0, 0, 255];
         let report = ErrorReport::compare(&frame, &reference).expect("same size");
         assert_eq!((report.max, report.share_above_4), (100, 0.5));
+    }
+
+    #[test]
+    fn encodings_must_agree() {
+        let mut frame = frame_of(&row(3));
+        frame.set_encoding(Encoding::Linear);
+        let error = ErrorReport::compare(&frame, &row(3)).expect_err("encodings differ");
+        assert_eq!(
+            error.to_string(),
+            "an image stored as linear cannot be compared with a reference stored as srgb"
+        );
     }
 
     #[test]

@@ -10,7 +10,7 @@ pub mod sweep;
 
 pub use bench::{BenchOptions, BenchPhase, BenchReport, bench};
 pub use inspection::Inspection;
-pub use metrics::{ErrorHistogram, ErrorReport, SizeMismatch};
+pub use metrics::{ErrorHistogram, ErrorReport, Mismatch};
 pub use overlay::{Layer, draw_overlay};
 pub use reference::ReferenceImage;
 pub use sweep::{Calibration, Sweep, SweepBudget, SweepOptions, SweepRow};

@@ -3,7 +3,7 @@
 //! It is kept slow and obvious. Coverage and ownership follow the rules of [`geometry::screen`](crate::geometry::screen)
 //! one pixel at a time; then, for each covered pixel, position and normal are interpolated perspective-correctly with
 //! the owning triangle's unsnapped barycentrics, clamped to the triangle, and the illumination equation is evaluated,
-//! all in `f64`; the result is clamped to `[0, 1]` and encoded.
+//! all in `f64`; the result is clamped to `[0, 1]` and encoded as the view says.
 //!
 //! Triangles seen from behind are not drawn: what a two-sided material shows there are triangles of the world as well, with
 //! normals of their own.
@@ -18,7 +18,7 @@ use crate::geometry::screen::{
 };
 use crate::illumination::reference::{Shaded, shade};
 use crate::math::PixelPoint;
-use crate::output::encode::{encode, encode_u8};
+use crate::output::Encoding;
 use crate::scene::{View, World};
 use glam::DVec3;
 
@@ -37,6 +37,8 @@ pub struct ReferenceImage {
     pub height: u32,
     /// The triangle that owns each pixel, or [`NO_TRIANGLE`].
     pub ids: Vec<u32>,
+    /// How light is stored.
+    pub encoding: Encoding,
     /// Encoded colours.
     pub pixels: Vec<[u8; 3]>,
     /// Encoded colours in `0..=255`, not rounded.
@@ -59,8 +61,9 @@ impl ReferenceImage {
             width: view.width,
             height: view.height,
             ids,
-            pixels: vec![background.map(encode_u8); len],
-            codes: vec![background.map(encode); len],
+            encoding: view.encoding,
+            pixels: vec![background.map(|c| view.encoding.encode_u8(c)); len],
+            codes: vec![background.map(|c| view.encoding.encode(c)); len],
             grazing: vec![false; len],
         };
         image.shade_covered(world, view, &corners, threads);
@@ -103,8 +106,8 @@ impl ReferenceImage {
                     continue;
                 }
                 let shaded = shade_pixel(world, view, corners, id as usize, [x as i32, y as i32]);
-                pixels[x] = shaded.rgb.map(encode_u8);
-                codes[x] = shaded.rgb.map(encode);
+                pixels[x] = shaded.rgb.map(|c| view.encoding.encode_u8(c));
+                codes[x] = shaded.rgb.map(|c| view.encoding.encode(c));
                 grazing[x] = shaded.smallest_cosine < GRAZING_COSINE;
             }
         };
@@ -221,6 +224,7 @@ fn weighted(vectors: &Vec3s, vertices: [usize; 3], weights: [f64; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::encode::{encode, encode_u8};
     use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial};
     use glam::{DMat4, DVec4};
 
@@ -241,6 +245,7 @@ mod tests {
                 DVec4::new(0.0, 0.0, NEAR, 0.0),
             ),
             eye: Eye::Point([0.0; 3]),
+            encoding: Encoding::Srgb,
         }
     }
 

@@ -14,7 +14,7 @@ use super::{ErrorReport, ReferenceImage};
 use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
 use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
-use crate::output::Frame;
+use crate::output::{Encoding, Frame};
 use crate::scene::Scene;
 use crate::schedule::Budget;
 use crate::simd::SimdLevel;
@@ -41,6 +41,8 @@ pub struct SweepOptions {
     pub threads: Option<usize>,
     /// What draws.
     pub backend: BackendKind,
+    /// How images store light; errors are measured in its codes.
+    pub encoding: Encoding,
     /// SIMD level; `None` for the machine's strongest.
     pub simd: Option<SimdLevel>,
     /// Where time comes from.
@@ -58,6 +60,7 @@ impl Default for SweepOptions {
             calibration_frames: 30,
             threads: None,
             backend: BackendKind::default(),
+            encoding: Encoding::default(),
             simd: None,
             clock: Arc::new(SystemClock::new()),
         }
@@ -71,6 +74,7 @@ impl SweepOptions {
             EngineOptions {
                 method,
                 backend: self.backend,
+                encoding: self.encoding,
                 threads: self.threads,
                 simd: self.simd,
                 clock: Arc::clone(&self.clock),
@@ -225,7 +229,9 @@ impl<'a> Sweep<'a> {
         // The world does not depend on the method, but there may be no method.
         let gouraud = options.engine(scene, Method::Gouraud)?;
         let world = gouraud.world();
-        let view = world.view(scene.camera(), options.width, options.height);
+        let view = world
+            .view(scene.camera(), options.width, options.height)
+            .with_encoding(options.encoding);
         Ok(Self {
             name: name.into(),
             scene,
@@ -361,7 +367,7 @@ impl<'a> Sweep<'a> {
             frame: number,
             frame_ms: stats.frame_ms,
             overshoot_ms: stats.frame_ms - budget.millis,
-            error: ErrorReport::of_same_size(&self.frame, &self.reference),
+            error: ErrorReport::of_same_kind(&self.frame, &self.reference),
             triangles_subdivided: stats.triangles_subdivided,
             converged: stats.converged,
         }

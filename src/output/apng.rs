@@ -3,7 +3,7 @@
 //! One frame is in memory at a time. The number of frames stands at the start of the file, so it must be known
 //! beforehand. The file appears whole or not at all, as with [`png`](super::png).
 
-use super::Frame;
+use super::frame::{Frame, suits_film};
 use super::png::{SaveError, Scratch, encode_error};
 use super::timing::Timing;
 use std::fs::File;
@@ -43,18 +43,15 @@ impl ApngWriter {
         })
     }
 
-    /// Adds a frame; its alpha is left out.
+    /// Adds an sRGB frame; its alpha is left out.
     ///
     /// # Errors
-    /// When the file cannot be written, the frame is not of the film's size, or it is one too many.
+    /// When the file cannot be written, the frame is not of the film's size or not sRGB, or it is one too many.
     pub fn write(&mut self, frame: &Frame) -> Result<(), SaveError> {
-        let size = [frame.width(), frame.height()];
-        if size != self.size {
-            return Err(SaveError::Encode {
-                path: self.path.clone(),
-                reason: format!("a frame of {size:?} pixels in a film of {:?}", self.size),
-            });
-        }
+        suits_film(frame, self.size).map_err(|reason| SaveError::Encode {
+            path: self.path.clone(),
+            reason,
+        })?;
         self.rgb.clear();
         self.rgb
             .extend(frame.pixels().iter().flat_map(|&[r, g, b, _]| [r, g, b]));

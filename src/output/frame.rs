@@ -1,24 +1,27 @@
 //! The image an engine renders into.
 
+use super::Encoding;
 use super::target::{PIXEL_BYTES, Stamp, Target};
 
-/// An 8-bit RGBA image, rows from the top, sRGB encoded, opaque.
+/// An 8-bit RGBA image, rows from the top, opaque.
 #[derive(Clone, Debug)]
 pub struct Frame {
     width: u32,
     height: u32,
     pixels: Vec<[u8; 4]>,
+    encoding: Encoding,
     stamp: Option<Stamp>,
 }
 
 impl Frame {
-    /// A black frame of `width` x `height` pixels.
+    /// A black sRGB frame of `width` x `height` pixels.
     #[must_use]
     pub fn new(width: u32, height: u32) -> Self {
         Self {
             width,
             height,
             pixels: vec![[0, 0, 0, 255]; width as usize * height as usize],
+            encoding: Encoding::default(),
             stamp: None,
         }
     }
@@ -33,6 +36,32 @@ impl Frame {
     #[must_use]
     pub fn height(&self) -> u32 {
         self.height
+    }
+
+    /// How the pixels store light. An engine that renders into the frame sets it.
+    #[must_use]
+    pub fn encoding(&self) -> Encoding {
+        self.encoding
+    }
+
+    /// Says how the pixels store light; they stay as they are.
+    pub fn set_encoding(&mut self, encoding: Encoding) {
+        self.encoding = encoding;
+    }
+
+    /// Stores the same light in another encoding, to the nearest code. From linear to sRGB, dark tones come in steps.
+    pub fn convert(&mut self, encoding: Encoding) {
+        let from = std::mem::replace(&mut self.encoding, encoding);
+        if from == encoding {
+            return;
+        }
+        let codes: [u8; 256] =
+            std::array::from_fn(|code| encoding.encode_u8(from.decode(code as f64)));
+        for [r, g, b, _] in self.pixels_mut() {
+            for channel in [r, g, b] {
+                *channel = codes[usize::from(*channel)];
+            }
+        }
     }
 
     /// The pixels as `[red, green, blue, alpha]`, row after row from the top.
@@ -70,5 +99,46 @@ impl Frame {
         let result = write(&mut target);
         self.stamp = target.stamp();
         result
+    }
+}
+
+/// Films are sRGB, and their frames have one size; else the reason why this one is no frame of it.
+pub(super) fn suits_film(frame: &Frame, size: [u32; 2]) -> Result<(), String> {
+    let own = [frame.width, frame.height];
+    if own != size {
+        return Err(format!("a frame of {own:?} pixels in a film of {size:?}"));
+    }
+    if frame.encoding != Encoding::Srgb {
+        let encoding = frame.encoding;
+        return Err(format!(
+            "a frame stored as {encoding} in a film, which is srgb"
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conversion_keeps_the_light_and_alpha() {
+        let mut frame = Frame::new(256, 1);
+        for (code, pixel) in (0..=255).zip(frame.pixels_mut()) {
+            *pixel = [code, 255 - code, 7, code];
+        }
+        let before = frame.clone();
+        frame.convert(Encoding::Srgb);
+        assert_eq!(frame.pixels(), before.pixels());
+        frame.convert(Encoding::Linear);
+        assert_eq!(frame.encoding(), Encoding::Linear);
+        // sRGB 188 is half of full light.
+        assert_eq!(frame.pixels()[188], [128, 14, 1, 188]);
+        assert_eq!(frame.pixels()[255], [255, 0, 1, 255]);
+        frame.convert(Encoding::Srgb);
+        // Bright tones come back, where the curve is flatter than a straight line.
+        for (after, before) in frame.pixels().iter().zip(before.pixels()).skip(128) {
+            assert_eq!(after[0], before[0]);
+        }
     }
 }

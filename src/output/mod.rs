@@ -2,6 +2,7 @@
 
 pub mod apng;
 pub mod encode;
+mod encoding;
 pub mod frame;
 mod interpolation;
 pub mod png;
@@ -10,6 +11,7 @@ pub mod target;
 pub mod timing;
 pub mod y4m;
 
+pub use encoding::Encoding;
 pub use frame::Frame;
 pub use interpolation::Interpolation;
 pub use png::SaveError;

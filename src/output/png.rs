@@ -4,7 +4,7 @@
 //! destination's name in one step. Whatever fails, nothing half-written stays, and an older image under that name is
 //! kept.
 
-use super::Frame;
+use super::{Encoding, Frame};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -43,7 +43,8 @@ pub fn plain_reason(error: &io::Error) -> String {
 }
 
 impl Frame {
-    /// Writes the frame as an 8-bit sRGB PNG file, whole or not at all: RGB if every pixel is opaque, else RGBA.
+    /// Writes the frame as an 8-bit PNG file, whole or not at all: RGB if every pixel is opaque, else RGBA. The file says
+    /// what the frame's [encoding](Frame::encoding) is.
     ///
     /// # Errors
     /// When the file cannot be written, or the frame has no pixels.
@@ -99,7 +100,13 @@ fn encode(frame: &Frame, writer: impl Write) -> Result<(), png::EncodingError> {
     } else {
         png::ColorType::Rgba
     });
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    match frame.encoding() {
+        Encoding::Srgb => encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual),
+        Encoding::Linear => {
+            encoder.set_source_gamma(png::ScaledFloat::new(1.0));
+            encoder.set_source_chromaticities(srgb_chromaticities());
+        }
+    }
     let mut writer = encoder.write_header()?;
     let mut stream = writer.stream_writer()?;
     if opaque {
@@ -114,6 +121,11 @@ fn encode(frame: &Frame, writer: impl Write) -> Result<(), png::EncodingError> {
     }
     stream.finish()?;
     writer.finish()
+}
+
+/// White and the primaries of sRGB (ITU-R BT.709), which a file without the chunk for sRGB has to give.
+fn srgb_chromaticities() -> png::SourceChromaticities {
+    png::SourceChromaticities::new((0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06))
 }
 
 /// A file that is removed again unless it is renamed.
@@ -228,6 +240,25 @@ mod tests {
         assert_eq!(info.color_type, png::ColorType::Rgba);
         assert_eq!(pixels, frame.as_bytes());
         assert_eq!(files_in(directory.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn a_file_says_how_its_light_is_stored() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("a.png");
+        let mut frame = gradient(5, 3);
+        for (encoding, is_srgb) in [(Encoding::Srgb, true), (Encoding::Linear, false)] {
+            frame.set_encoding(encoding);
+            frame.save_png(&path).expect("writable");
+            let file = io::BufReader::new(File::open(&path).expect("written"));
+            let reader = png::Decoder::new(file).read_info().expect("a PNG file");
+            let info = reader.info();
+            assert_eq!(info.srgb.is_some(), is_srgb);
+            if !is_srgb {
+                assert_eq!(info.gama_chunk, Some(png::ScaledFloat::new(1.0)));
+                assert_eq!(info.chrm_chunk, Some(srgb_chromaticities()));
+            }
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Memory of the caller that an image is handed over into.
 //!
-//! Pixels are four bytes each, encoded as sRGB and opaque, rows from the top, a *stride* of bytes apart. So an engine
+//! Pixels are four bytes each, in the engine's [encoding](super::Encoding) and opaque, rows from the top, a *stride* of bytes apart. So an engine
 //! renders straight into what a window system, a shared memory segment or an image library offers, without a copy.
 //!
 //! A target says what it holds already, and pixels that are right are not written again: see [`Target::with_age`].

@@ -16,7 +16,7 @@
 //! pixels of width or 577 of height on, BT.601's below; so does this module. `ffmpeg` has to be told when it makes RGB of
 //! a large film (`-colorspace bt709`).
 
-use super::Frame;
+use super::frame::{Frame, suits_film};
 use super::png::{SaveError, Scratch, io_error};
 use super::timing::Timing;
 use std::fs::File;
@@ -82,16 +82,13 @@ impl<W: Write> Y4mWriter<W> {
         })
     }
 
-    /// Adds a frame; its alpha is left out.
+    /// Adds an sRGB frame; its alpha is left out.
     ///
     /// # Errors
-    /// What the writer says, and when the frame is not of the film's size.
+    /// What the writer says, and when the frame is not of the film's size or not sRGB.
     pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
-        let size = [frame.width(), frame.height()];
-        if size != self.size {
-            let reason = format!("a frame of {size:?} pixels in a film of {:?}", self.size);
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
-        }
+        suits_film(frame, self.size)
+            .map_err(|reason| io::Error::new(io::ErrorKind::InvalidInput, reason))?;
         let planes = &mut self.buffer[FRAME_HEADER.len()..];
         match self.matrix {
             Matrix::Bt601 => convert::<2990, 1140>(frame.pixels(), planes),

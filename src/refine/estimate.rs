@@ -1,7 +1,7 @@
 //! How wrong a leaf is, estimated.
 //!
 //! All errors are mean squares over a leaf's area and the three channels, in squared 8-bit codes of the *encoded*
-//! colour, clamped as the pixel will be.
+//! colour, clamped and encoded as the pixel will be.
 //!
 //! **At edge midpoints.** Let `d` be the deviation of the encoded interpolated colour from the encoded true one. Where
 //! the true colour is smooth, `d` is close to a quadratic over the leaf; a quadratic is given by its values at the three
@@ -14,10 +14,10 @@
 
 use crate::geometry::Vec3s;
 use crate::illumination::PointBatch;
-use crate::output::Interpolation;
 use crate::output::encode::encode_codes_lanes;
+use crate::output::{Encoding, Interpolation};
 use crate::parallel::Exec;
-use crate::scene::{Eye, World};
+use crate::scene::{View, World};
 use crate::simd::{Level, Simd, dispatch};
 use fearless_simd::prelude::*;
 
@@ -95,15 +95,16 @@ impl Samples {
         self.interpolated.push(interpolated);
     }
 
-    /// Illuminates all points and compares.
-    pub fn illuminate(&mut self, exec: Exec, world: &World, eye: Eye) {
-        self.batch.illuminate(exec, world, eye);
+    /// Illuminates all points and compares, as the view has it.
+    pub fn illuminate(&mut self, exec: Exec, world: &World, view: &View) {
+        self.batch.illuminate(exec, world, view.eye);
         self.colours.clear();
         for sample in 0..self.batch.len() {
             self.colours.push(self.batch.colour(sample));
         }
         deviations(
             exec.level,
+            view.encoding,
             &self.colours,
             &self.interpolated,
             self.interpolation,
@@ -127,6 +128,7 @@ impl Samples {
 /// The codes of linear `colours` less those of `interpolated`, which are linear, or codes already.
 pub fn deviations(
     level: Level,
+    encoding: Encoding,
     colours: &Vec3s,
     interpolated: &Vec3s,
     interpolation: Interpolation,
@@ -135,15 +137,16 @@ pub fn deviations(
     out.resize(colours.len());
     let is_encoded = interpolation == Interpolation::EncodedAffine;
     dispatch!(level, simd => {
-        channel_deviations(simd, &colours.x, &interpolated.x, is_encoded, &mut out.x);
-        channel_deviations(simd, &colours.y, &interpolated.y, is_encoded, &mut out.y);
-        channel_deviations(simd, &colours.z, &interpolated.z, is_encoded, &mut out.z);
+        channel_deviations(simd, encoding, &colours.x, &interpolated.x, is_encoded, &mut out.x);
+        channel_deviations(simd, encoding, &colours.y, &interpolated.y, is_encoded, &mut out.y);
+        channel_deviations(simd, encoding, &colours.z, &interpolated.z, is_encoded, &mut out.z);
     });
 }
 
 #[inline(always)]
 fn channel_deviations<S: Simd>(
     simd: S,
+    encoding: Encoding,
     colours: &[f32],
     interpolated: &[f32],
     is_encoded: bool,
@@ -162,9 +165,9 @@ fn channel_deviations<S: Simd>(
         let shown = if is_encoded {
             shown
         } else {
-            encode_codes_lanes(simd, shown)
+            encode_codes_lanes(simd, encoding, shown)
         };
-        let difference = encode_codes_lanes(simd, load(colours)) - shown;
+        let difference = encode_codes_lanes(simd, encoding, load(colours)) - shown;
         out[done..done + count].copy_from_slice(&difference.as_slice()[..count]);
         done += count;
     }

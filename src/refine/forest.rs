@@ -8,7 +8,7 @@ use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
 use crate::output::Interpolation;
 use crate::parallel::Exec;
-use crate::scene::{Eye, World};
+use crate::scene::{View, World};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -208,13 +208,13 @@ impl Forest {
         &mut self,
         exec: Exec,
         world: &World,
-        eye: Eye,
+        view: &View,
         base_colours: &Vec3s,
         planted: &mut Vec<LeafId>,
     ) {
         self.vertices
-            .illuminate(exec, world, eye, base_colours, self.shown.as_ref());
-        self.samples.illuminate(exec, world, eye);
+            .illuminate(exec, world, view, base_colours, self.shown.as_ref());
+        self.samples.illuminate(exec, world, view);
         let mut fresh = std::mem::take(&mut self.fresh);
         for (id, samples) in fresh.drain(..) {
             let error = self.own_error(self.leaves[id as usize].midpoints, samples);
@@ -224,7 +224,7 @@ impl Forest {
             planted.push(id);
         }
         self.fresh = fresh;
-        self.estimate_planned(exec, world, base_colours);
+        self.estimate_planned(exec, world, view.encoding, base_colours);
         self.samples.clear();
     }
 

@@ -117,7 +117,8 @@ impl Forest {
             interpolation,
         };
         if shown.is_encoded() {
-            self.vertices.encode_base(level, base_colours);
+            self.vertices
+                .encode_base(level, view.encoding, base_colours);
         }
         self.samples.set_interpolation(interpolation);
         self.shown = Some(shown);
@@ -166,6 +167,7 @@ impl Forest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::Encoding;
     use crate::scene::Eye;
     use glam::{DMat4, DVec4};
 
@@ -181,6 +183,7 @@ mod tests {
                 DVec4::new(0.0, 0.0, 0.5, 0.0),
             ),
             eye: Eye::Point([0.0; 3]),
+            encoding: Encoding::Srgb,
         };
         Shown {
             view,

@@ -4,7 +4,7 @@ use super::estimate::{SAMPLES_AT_ONCE, deviations, mean_square};
 use super::forest::{Forest, LeafError, LeafId, LeafState, NONE, Seedling};
 use crate::geometry::bary::blend;
 use crate::geometry::{Bary, Vec3s};
-use crate::output::Interpolation;
+use crate::output::{Encoding, Interpolation};
 use crate::parallel::Exec;
 use crate::scene::World;
 use std::ops::Range;
@@ -343,7 +343,13 @@ impl Forest {
     }
 
     /// Estimates the errors of all planned children, and of their parents at the same points.
-    pub(super) fn estimate_planned(&mut self, exec: Exec, world: &World, base_colours: &Vec3s) {
+    pub(super) fn estimate_planned(
+        &mut self,
+        exec: Exec,
+        world: &World,
+        encoding: Encoding,
+        base_colours: &Vec3s,
+    ) {
         let mut planner = std::mem::take(&mut self.planner);
         planner.check_colours.clear();
         planner.check_interpolated.clear();
@@ -380,6 +386,7 @@ impl Forest {
         }
         deviations(
             exec.level,
+            encoding,
             &planner.check_colours,
             &planner.check_interpolated,
             self.shown

@@ -5,8 +5,9 @@ use super::{Forest, LeafId, LeafState, PlanOutcome, SplitOutcome};
 use crate::geometry::bary::blend;
 use crate::geometry::topology::Topology;
 use crate::geometry::{Bary, Mesh, Vec3s, shapes};
+use crate::output::Encoding;
 use crate::parallel::Exec;
-use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, World};
+use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, View, World};
 use crate::simd::SimdLevel;
 use std::collections::{HashMap, HashSet};
 
@@ -56,6 +57,15 @@ fn world_of(mesh: &Mesh) -> World {
 
 const EYE: Eye = Eye::Point([4.0, 0.5, 1.0]);
 
+/// Only where the eye is matters.
+const VIEW: View = View {
+    width: 0,
+    height: 0,
+    pixel_from_world: glam::DMat4::IDENTITY,
+    eye: EYE,
+    encoding: Encoding::Srgb,
+};
+
 fn base_colours(world: &World) -> Vec3s {
     let mut colours = Vec3s::default();
     colours.resize(world.positions.len());
@@ -83,7 +93,7 @@ fn walk(world: &World, seed: u32, rounds: usize, mut check: impl FnMut(&Forest, 
             let marks = 1 + random.below(7) as u8;
             forest.plan_split(world, &colours, leaf, marks, |_| 1000);
         }
-        forest.illuminate(exec(), world, EYE, &colours, &mut planted);
+        forest.illuminate(exec(), world, &VIEW, &colours, &mut planted);
         outcomes.clear();
         forest.conclude_splits(world, &mut outcomes);
         if let Some(SplitOutcome::Committed { children, .. }) = outcomes.first() {
@@ -225,11 +235,11 @@ fn committed_splits_lower_the_error_that_dense_sampling_finds() {
         let measured = dense_error(&world, &forest, &colours);
         assert!(measured < last, "round {round}: {measured} after {last}");
         last = measured;
-        forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+        forest.illuminate(exec(), &world, &VIEW, &colours, &mut planted);
         for id in open_leaves(&forest) {
             forest.plan_split(&world, &colours, id, 7, |_| 200);
         }
-        forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+        forest.illuminate(exec(), &world, &VIEW, &colours, &mut planted);
         forest.conclude_splits(&world, &mut outcomes);
     }
 }
@@ -275,14 +285,14 @@ fn a_leaf_is_not_split_before_its_midpoints_are_illuminated() {
     let root = forest
         .plant(&world, &colours, 0, 10)
         .expect("there is room");
-    forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+    forest.illuminate(exec(), &world, &VIEW, &colours, &mut planted);
     assert_eq!(planted, [root]);
     // The first call plants the other half of the square; until that is illuminated nothing can be planned with it.
     for _ in 0..2 {
         let outcome = forest.plan_split(&world, &colours, root, 7, |_| 10);
         assert_eq!(outcome, PlanOutcome::Later);
     }
-    forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+    forest.illuminate(exec(), &world, &VIEW, &colours, &mut planted);
     assert_eq!(planted.len(), 2);
     let outcome = forest.plan_split(&world, &colours, root, 7, |_| 10);
     assert_eq!(outcome, PlanOutcome::Planned);
@@ -305,7 +315,7 @@ fn asked_again_a_split_that_does_not_help_is_carried_out() {
         outcomes.clear();
         loop {
             let plan = forest.plan_split(&world, &colours, root, 7, |_| 10);
-            forest.illuminate(exec(), &world, EYE, &colours, &mut planted);
+            forest.illuminate(exec(), &world, &VIEW, &colours, &mut planted);
             if plan == PlanOutcome::Planned {
                 break;
             }
@@ -351,7 +361,7 @@ fn an_edge_is_not_split_when_its_other_side_has_no_room_to_follow() {
     world.triangles.push([0; 3]);
     world.triangle_material.push(0);
     forest.plant(&world, &colours, copies as u32 + 1, 0);
-    forest.illuminate(exec(), &world, EYE, &colours, &mut Vec::new());
+    forest.illuminate(exec(), &world, &VIEW, &colours, &mut Vec::new());
     let outcome = forest.plan_split(&world, &colours, root, 7, |_| 10);
     assert_eq!(outcome, PlanOutcome::Never);
     assert!(!forest.is_planted(1), "the forest is full");
@@ -361,8 +371,6 @@ fn an_edge_is_not_split_when_its_other_side_has_no_room_to_follow() {
 fn errors_are_estimated_against_what_the_device_shows() {
     use crate::illumination::reference;
     use crate::output::Interpolation;
-    use crate::output::encode::encode;
-    use crate::scene::View;
     use glam::{DMat4, DVec4};
     let mut world = world_of(&shapes::sphere(8, 5));
     // Smooth, so that edges tell what is inside.
@@ -380,22 +388,24 @@ fn errors_are_estimated_against_what_the_device_shows() {
             DVec4::new(55.0, 44.0, 0.1, 1.1),
         ),
         eye: EYE,
+        encoding: Encoding::Srgb,
     };
-    let estimate = |declared: Interpolation| {
+    let estimate = |view: &View, declared: Interpolation| {
         let mut forest = Forest::default();
         forest.reset(&world);
-        forest.draw_once(exec().level, &view, declared, &colours);
+        forest.draw_once(exec().level, view, declared, &colours);
         for triangle in 0..world.triangles.len() as u32 {
             forest.plant(&world, &colours, triangle, 10);
         }
-        forest.illuminate(exec(), &world, EYE, &colours, &mut Vec::new());
+        forest.illuminate(exec(), &world, view, &colours, &mut Vec::new());
         let leaves = open_leaves(&forest);
         leaves
             .iter()
             .map(|&id| f64::from(forest.leaf(id).error))
             .sum::<f64>()
     };
-    let measured = |shown: Interpolation| {
+    let measured = |view: &View, shown: Interpolation| {
+        let encode = |light| view.encoding.encode(light);
         let mut total = 0.0;
         for triangle in &world.triangles {
             let at = |array: &Vec3s, weights: [f32; 3]| {
@@ -436,16 +446,19 @@ fn errors_are_estimated_against_what_the_device_shows() {
         Interpolation::LinearPerspective,
         Interpolation::EncodedAffine,
     ];
-    for declared in modes {
-        let (got, want) = (estimate(declared), measured(declared));
+    for encoding in Encoding::ALL {
+        let view = view.with_encoding(encoding);
+        for declared in modes {
+            let (got, want) = (estimate(&view, declared), measured(&view, declared));
+            assert!(
+                (0.88..1.12).contains(&(got / want)),
+                "{encoding}, {declared:?}: {got} estimated, {want} measured"
+            );
+        }
+        let [linear, affine] = modes.map(|shown| measured(&view, shown));
         assert!(
-            (0.88..1.12).contains(&(got / want)),
-            "{declared:?}: {got} estimated, {want} measured"
+            linear < 0.75 * affine,
+            "{encoding}: the two differ, or this shows nothing: {linear} {affine}"
         );
     }
-    let [linear, affine] = modes.map(measured);
-    assert!(
-        linear < 0.75 * affine,
-        "the two differ, or this shows nothing: {linear} {affine}"
-    );
 }

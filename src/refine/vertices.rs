@@ -7,9 +7,10 @@ use super::estimate::{SAMPLES_AT_ONCE, Samples};
 use super::forest::FIRST_LEAVES;
 use super::shown::Shown;
 use crate::geometry::Vec3s;
+use crate::output::Encoding;
 use crate::output::encode::encode_codes;
 use crate::parallel::Exec;
-use crate::scene::{Eye, World};
+use crate::scene::{View, World};
 use crate::simd::Level;
 use rustc_hash::FxHashMap;
 
@@ -113,8 +114,8 @@ impl VertexPool {
     }
 
     /// Encodes the colours of the world's own vertices.
-    pub(super) fn encode_base(&mut self, level: Level, base_colours: &Vec3s) {
-        encode_all(level, base_colours, 0, &mut self.base_codes);
+    pub(super) fn encode_base(&mut self, level: Level, encoding: Encoding, base_colours: &Vec3s) {
+        encode_all(level, encoding, base_colours, 0, &mut self.base_codes);
     }
 
     /// A vertex's colour as it is interpolated.
@@ -184,7 +185,7 @@ impl VertexPool {
         &mut self,
         exec: Exec,
         world: &World,
-        eye: Eye,
+        view: &View,
         base_colours: &Vec3s,
         shown: Option<&Shown>,
     ) {
@@ -202,13 +203,19 @@ impl VertexPool {
                 self.half_way(world, base_colours, shown, parents),
             );
         }
-        scratch.illuminate(exec, world, eye);
+        scratch.illuminate(exec, world, view);
         for (sample, index) in range.clone().enumerate() {
             self.colours.set(index, scratch.colour(sample));
             self.surplus.set(index, scratch.deviation(sample));
         }
         if shown.is_some_and(Shown::is_encoded) {
-            encode_all(exec.level, &self.colours, range.start, &mut self.codes);
+            encode_all(
+                exec.level,
+                view.encoding,
+                &self.colours,
+                range.start,
+                &mut self.codes,
+            );
         }
         self.scratch = scratch;
     }
@@ -233,9 +240,9 @@ impl VertexPool {
 }
 
 /// Encodes colours from the one at `first` on.
-fn encode_all(level: Level, colours: &Vec3s, first: usize, codes: &mut Vec3s) {
+fn encode_all(level: Level, encoding: Encoding, colours: &Vec3s, first: usize, codes: &mut Vec3s) {
     codes.resize(colours.len());
-    encode_codes(level, &colours.x[first..], &mut codes.x[first..]);
-    encode_codes(level, &colours.y[first..], &mut codes.y[first..]);
-    encode_codes(level, &colours.z[first..], &mut codes.z[first..]);
+    encode_codes(level, encoding, &colours.x[first..], &mut codes.x[first..]);
+    encode_codes(level, encoding, &colours.y[first..], &mut codes.y[first..]);
+    encode_codes(level, encoding, &colours.z[first..], &mut codes.z[first..]);
 }

@@ -15,6 +15,7 @@
 
 use super::{Camera, Projection, unit};
 use crate::math::{PixelPoint, transform_point};
+use crate::output::Encoding;
 use glam::{DMat4, DVec3, DVec4};
 
 /// Where the viewer is, in world space.
@@ -37,6 +38,8 @@ pub struct View {
     pub pixel_from_world: DMat4,
     /// Where the viewer is.
     pub eye: Eye,
+    /// How the image stores light.
+    pub encoding: Encoding,
 }
 
 /// A perspective eye farther away than this, in world units, is shaded as if it were infinitely far, like a light:
@@ -91,7 +94,14 @@ impl View {
             )
             .transpose(),
             eye: shading_eye(eye, forward, perspective),
+            encoding: Encoding::default(),
         }
+    }
+
+    /// The view with its image stored in another encoding than sRGB.
+    #[must_use]
+    pub fn with_encoding(self, encoding: Encoding) -> Self {
+        Self { encoding, ..self }
     }
 
     /// A world point in homogeneous pixel space.

@@ -8,6 +8,7 @@ use specula::backend::{Backend, Geometry};
 use specula::geometry::screen::{
     self, EdgeFunction, PixelBox, TrianglePlanes, clip, doubled_area, snap,
 };
+use specula::output::Encoding;
 use specula::parallel::Exec;
 use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, View, World};
 use specula::simd::SimdLevel;
@@ -99,6 +100,7 @@ pub(crate) fn perspective(width: u32, height: u32, zoom: f64, near: f64, far: f6
             DVec4::new(0.0, 0.0, near * far / (far - near), 0.0),
         ),
         eye: Eye::Point([0.0; 3]),
+        encoding: Encoding::default(),
     }
 }
 
@@ -109,6 +111,7 @@ pub(crate) fn flat(width: u32, height: u32) -> View {
         height,
         pixel_from_world: DMat4::IDENTITY,
         eye: Eye::Direction([0.0, 0.0, 1.0]),
+        encoding: Encoding::default(),
     }
 }
 

@@ -203,7 +203,12 @@ impl Backend for SkiaBackend {
         self.shapes.sort_unstable_by(Shape::painting_order);
         self.sort_into_tiles();
         let mut background = [0.0; 3];
-        encode_codes(exec.level, &geometry.world.background, &mut background);
+        encode_codes(
+            exec.level,
+            geometry.view.encoding,
+            &geometry.world.background,
+            &mut background,
+        );
         let (shapes, serial) = (&self.shapes, self.serial);
         exec.for_each_chunk(&mut self.tiles, 1, |_, tile| {
             tile[0].paint(shapes, background, serial);

@@ -6,6 +6,7 @@ use crate::geometry::bary::blend;
 use crate::geometry::screen::{TrianglePlanes, normalized_weights};
 use crate::geometry::viewport::ScreenPolygon;
 use crate::math::PixelPoint;
+use crate::output::Encoding;
 use crate::output::encode::encode_codes;
 use crate::simd::Level;
 use std::cmp::Ordering;
@@ -42,7 +43,11 @@ pub(super) fn collect(
 ) {
     shapes.clear();
     let world = geometry.world;
-    let mut collector = Collector { shapes, level };
+    let mut collector = Collector {
+        shapes,
+        level,
+        encoding: geometry.view.encoding,
+    };
     match paint {
         BasePaint::Flat(colours) => {
             for &triangle in visible {
@@ -80,6 +85,7 @@ pub(super) fn collect(
 struct Collector<'a> {
     shapes: &'a mut Vec<Shape>,
     level: Level,
+    encoding: Encoding,
 }
 
 impl Collector<'_> {
@@ -110,7 +116,7 @@ impl Collector<'_> {
         };
         let mut codes = [[0.0; 3]; MOST_VERTICES];
         for (codes, &point) in codes.iter_mut().zip(polygon.points()) {
-            encode_codes(self.level, &at(point), codes);
+            encode_codes(self.level, self.encoding, &at(point), codes);
         }
         self.push_pieces(corners, polygon, |index| codes[index]);
     }
@@ -137,7 +143,12 @@ impl Collector<'_> {
 
     fn encode(&self, colours: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
         let mut codes = [[0.0; 3]; 3];
-        encode_codes(self.level, colours.as_flattened(), codes.as_flattened_mut());
+        encode_codes(
+            self.level,
+            self.encoding,
+            colours.as_flattened(),
+            codes.as_flattened_mut(),
+        );
         codes
     }
 }

@@ -4,8 +4,7 @@
 //!
 //! | pass | over | does |
 //! |---|---|---|
-//! | `transform` | blocks of vertices | pixel space, clipping planes, sub-pixel grid |
-//! | `setup`, `planes` | `shares` of triangles | culls, clips, works out planes, sorts into tiles |
+//! | `setup` | `shares` of triangles | transforms vertices (`transform`), culls, clips, works out `planes`, sorts into tiles |
 //! | `raster` | tiles | coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them; counts owners' pixels |
 //! | `visible` | shares | lists the owners |
 //! | `resolve` | tiles | colours |
@@ -172,9 +171,8 @@ impl Backend for SoftwareBackend {
         self.fit(geometry);
         let grid = self.grid;
         self.shares.cut(geometry);
-        self.vertices
-            .transform(exec, geometry, self.shares.used_mut());
-        let vertices = &self.vertices;
+        self.vertices.clear(exec, geometry.world.positions.len());
+        let vertices = self.vertices.of(exec.level, geometry);
         exec.for_each_chunk(self.shares.used_mut(), 1, |_, share| {
             dispatch!(exec.level, simd => setup::set_up(simd, &mut share[0], geometry, grid, vertices));
         });
@@ -220,7 +218,7 @@ impl Backend for SoftwareBackend {
             &painter,
             &self.visible,
             self.grid,
-            &self.vertices,
+            self.vertices.of(exec.level, geometry),
             patches,
         );
         repaint::run(exec, &mut self.tiles, &mut self.jobs, &painter, patches);

@@ -1,11 +1,12 @@
 //! Depth and barycentric planes of several triangles at a time.
 //!
-//! What [`TrianglePlanes`](crate::geometry::screen::TrianglePlanes) says, operation by operation, over arrays of fixed length, which
-//! the compiler turns into vectors of the dispatched level. Each operation is rounded by itself, so the bits are the same at all
-//! levels, and those of the scalar rule: the tests compare them.
+//! What [`TrianglePlanes`](crate::geometry::screen::TrianglePlanes) says, operation by operation, in lanes of `f64`. Each operation
+//! is rounded by itself, so the bits are the same at all levels, and those of the scalar rule: the tests compare them.
 
 use crate::geometry::screen::DepthPlane;
 use crate::math::PixelPoint;
+use crate::simd::Simd;
+use fearless_simd::prelude::*;
 
 /// Triangles worked on together: a vector of `f64` at the widest level.
 pub(super) const TRIANGLES: usize = 8;
@@ -23,7 +24,7 @@ pub(super) struct Corners {
 }
 
 /// The planes of [`TRIANGLES`] triangles.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Planes {
     base: Each<f32>,
     dx: Each<f32>,
@@ -57,77 +58,112 @@ impl Corners {
 
     /// The planes of all triangles; meaningless for those that have not been set.
     #[inline(always)]
-    pub(super) fn planes(&self) -> Planes {
-        let [v0, v1, v2] = &self.points;
-        let edges = [cross(v1, v2), cross(v2, v0), cross(v0, v1)];
-        let mut determinant = [0.0; TRIANGLES];
-        for i in 0..TRIANGLES {
-            determinant[i] =
-                v0[X][i] * edges[0][0][i] + v0[Y][i] * edges[0][1][i] + v0[W][i] * edges[0][2][i];
+    pub(super) fn planes<S: Simd>(&self, simd: S) -> Planes {
+        let mut planes = Planes::default();
+        for first in (0..TRIANGLES).step_by(S::f64s::LEN) {
+            let lanes = CornerLanes::<S>::load(simd, self, first);
+            lanes.depth(simd, &mut planes, first);
+            lanes.interpolators(simd, &mut planes, first);
         }
-        let mut center = [[0.0; TRIANGLES]; 2];
-        for i in 0..TRIANGLES {
-            center[0][i] = self.anchor[0][i] + 0.5;
-            center[1][i] = self.anchor[1][i] + 0.5;
-        }
-        let [min, max] = self.depth_range();
-        let [base, dx, dy] = self.depth(&edges, &determinant, &center, &max);
-        let [a, b, c] = interpolators(&edges, &determinant, &center);
-        Planes {
-            base,
-            dx,
-            dy,
-            min: narrow(&min),
-            max: narrow(&max),
-            a,
-            b,
-            c,
+        planes
+    }
+}
+
+/// As many triangles as a vector holds.
+struct CornerLanes<S: Simd> {
+    /// By corner, then by component of [`PixelPoint`].
+    points: [[S::f64s; 4]; 3],
+    /// The centre of the anchor.
+    center: [S::f64s; 2],
+    /// `v_j x v_k` for the edge opposite to each corner.
+    edges: [[S::f64s; 3]; 3],
+    /// `v_0 . (v_1 x v_2)`.
+    determinant: S::f64s,
+}
+
+impl<S: Simd> CornerLanes<S> {
+    #[inline(always)]
+    fn load(simd: S, corners: &Corners, first: usize) -> Self {
+        let load = |each: &Each<f64>| S::f64s::from_slice(simd, &each[first..first + S::f64s::LEN]);
+        let [a, b, c] = &corners.points;
+        let points = [
+            [load(&a[0]), load(&a[1]), load(&a[2]), load(&a[3])],
+            [load(&b[0]), load(&b[1]), load(&b[2]), load(&b[3])],
+            [load(&c[0]), load(&c[1]), load(&c[2]), load(&c[3])],
+        ];
+        let [v0, v1, v2] = &points;
+        let edges = [cross::<S>(v1, v2), cross::<S>(v2, v0), cross::<S>(v0, v1)];
+        let determinant = v0[X] * edges[0][0] + v0[Y] * edges[0][1] + v0[W] * edges[0][2];
+        Self {
+            points,
+            center: [load(&corners.anchor[0]) + 0.5, load(&corners.anchor[1]) + 0.5],
+            edges,
+            determinant,
         }
     }
 
     /// Least and largest depth of the corners. They are in front of the eye and between the near and far planes.
     #[inline(always)]
-    fn depth_range(&self) -> [Each<f64>; 2] {
-        let (mut min, mut max) = ([f64::INFINITY; TRIANGLES], [f64::NEG_INFINITY; TRIANGLES]);
-        for corner in &self.points {
-            for i in 0..TRIANGLES {
-                let depth = (corner[Z][i] / corner[W][i]).clamp(0.0, 1.0);
-                min[i] = if depth < min[i] { depth } else { min[i] };
-                max[i] = if depth > max[i] { depth } else { max[i] };
-            }
-        }
-        [min, max]
+    fn depth_range(&self, simd: S) -> [S::f64s; 2] {
+        let [v0, v1, v2] = &self.points;
+        let (zero, one) = (S::f64s::splat(simd, 0.0), S::f64s::splat(simd, 1.0));
+        let [a, b, c] = [v0[Z] / v0[W], v1[Z] / v1[W], v2[Z] / v2[W]];
+        // Clamping keeps order, so it may come last.
+        [
+            a.min(b).min(c).max(zero).min(one),
+            a.max(b).max(c).max(zero).min(one),
+        ]
     }
 
-    /// Depth at the anchor's centre, and its change per pixel to the right and down.
+    /// Depth at the anchor's centre, its change per pixel to the right and down, and its range.
     #[inline(always)]
-    fn depth(
-        &self,
-        edges: &[[Each<f64>; 3]; 3],
-        determinant: &Each<f64>,
-        center: &[Each<f64>; 2],
-        max: &Each<f64>,
-    ) -> [Each<f32>; 3] {
+    fn depth(&self, simd: S, planes: &mut Planes, first: usize) {
         let [v0, v1, v2] = &self.points;
-        let mut plane = [[0.0; TRIANGLES]; 3];
-        for (k, plane) in plane.iter_mut().enumerate() {
-            for i in 0..TRIANGLES {
-                let sum = v0[Z][i] * edges[0][k][i]
-                    + v1[Z][i] * edges[1][k][i]
-                    + v2[Z][i] * edges[2][k][i];
-                plane[i] = sum / determinant[i];
+        let plane = |k: usize| {
+            let sum = v0[Z] * self.edges[0][k] + v1[Z] * self.edges[1][k] + v2[Z] * self.edges[2][k];
+            sum / self.determinant
+        };
+        let [dx, dy, constant] = [plane(0), plane(1), plane(2)];
+        let base = dx * self.center[0] + dy * self.center[1] + constant;
+        let limit = S::f64s::splat(simd, 1e30);
+        // False for what is not a number.
+        let usable = dx.abs().simd_lt(limit) & dy.abs().simd_lt(limit) & base.abs().simd_lt(limit);
+        let zero = S::f64s::splat(simd, 0.0);
+        let [min, max] = self.depth_range(simd);
+        narrow::<S>(usable.select(base, max), &mut planes.base, first);
+        narrow::<S>(usable.select(dx, zero), &mut planes.dx, first);
+        narrow::<S>(usable.select(dy, zero), &mut planes.dy, first);
+        narrow::<S>(min, &mut planes.min, first);
+        narrow::<S>(max, &mut planes.max, first);
+    }
+
+    /// The barycentric planes.
+    #[inline(always)]
+    fn interpolators(&self, simd: S, planes: &mut Planes, first: usize) {
+        let (zero, one) = (S::f64s::splat(simd, 0.0), S::f64s::splat(simd, 1.0));
+        let sign = self.determinant.simd_lt(zero).select(-one, one);
+        let at_anchor = |edge: &[S::f64s; 3]| {
+            (edge[0] * self.center[0] + edge[1] * self.center[1] + edge[2]) * sign
+        };
+        let [e0, e1, e2] = &self.edges;
+        let c = [at_anchor(e0), at_anchor(e1), at_anchor(e2)];
+        let mut largest = zero;
+        for (c, edge) in c.iter().zip(&self.edges) {
+            for value in [*c, edge[0], edge[1]] {
+                let value = value.abs();
+                // NaN does not take the place of a number.
+                largest = value.simd_gt(largest).select(value, largest);
             }
         }
-        let [mut base, mut dx, mut dy] = [[0.0; TRIANGLES]; 3];
-        for i in 0..TRIANGLES {
-            let at_anchor = plane[0][i] * center[0][i] + plane[1][i] * center[1][i] + plane[2][i];
-            let usable =
-                (plane[0][i].abs() < 1e30) & (plane[1][i].abs() < 1e30) & (at_anchor.abs() < 1e30);
-            dx[i] = if usable { plane[0][i] } else { 0.0 };
-            dy[i] = if usable { plane[1][i] } else { 0.0 };
-            base[i] = if usable { at_anchor } else { max[i] };
+        let infinity = S::f64s::splat(simd, f64::INFINITY);
+        let usable = largest.simd_gt(zero) & largest.simd_lt(infinity);
+        let scale = usable.select(one / largest, zero);
+        for corner in 0..3 {
+            let edge = &self.edges[corner];
+            narrow::<S>(edge[0] * sign * scale, &mut planes.a[corner], first);
+            narrow::<S>(edge[1] * sign * scale, &mut planes.b[corner], first);
+            narrow::<S>(c[corner] * scale, &mut planes.c[corner], first);
         }
-        [narrow(&base), narrow(&dx), narrow(&dy)]
     }
 }
 
@@ -139,65 +175,20 @@ const W: usize = 3;
 
 /// The cross product of corners' `(x w, y w, w)`.
 #[inline(always)]
-fn cross(a: &[Each<f64>; 4], b: &[Each<f64>; 4]) -> [Each<f64>; 3] {
-    let mut out = [[0.0; TRIANGLES]; 3];
-    for (out, [j, k]) in out.iter_mut().zip([[Y, W], [W, X], [X, Y]]) {
-        for i in 0..TRIANGLES {
-            out[i] = a[j][i] * b[k][i] - a[k][i] * b[j][i];
-        }
-    }
-    out
+fn cross<S: Simd>(a: &[S::f64s; 4], b: &[S::f64s; 4]) -> [S::f64s; 3] {
+    [
+        a[Y] * b[W] - a[W] * b[Y],
+        a[W] * b[X] - a[X] * b[W],
+        a[X] * b[Y] - a[Y] * b[X],
+    ]
 }
 
-/// The barycentric planes `a`, `b` and `c`, each by corner.
+/// Rounds to `f32`, into the places from `first` on.
 #[inline(always)]
-fn interpolators(
-    edges: &[[Each<f64>; 3]; 3],
-    determinant: &Each<f64>,
-    center: &[Each<f64>; 2],
-) -> [[Each<f32>; 3]; 3] {
-    let mut sign = [0.0; TRIANGLES];
-    for i in 0..TRIANGLES {
-        sign[i] = if determinant[i] < 0.0 { -1.0 } else { 1.0 };
+fn narrow<S: Simd>(values: S::f64s, to: &mut Each<f32>, first: usize) {
+    for (to, value) in to[first..].iter_mut().zip(values.as_slice()) {
+        *to = *value as f32;
     }
-    let mut at_anchor = [[0.0; TRIANGLES]; 3];
-    let mut largest = [0.0; TRIANGLES];
-    for (c, edge) in at_anchor.iter_mut().zip(edges) {
-        for i in 0..TRIANGLES {
-            c[i] = (edge[0][i] * center[0][i] + edge[1][i] * center[1][i] + edge[2][i]) * sign[i];
-            for value in [c[i], edge[0][i], edge[1][i]] {
-                // NaN does not take the place of a number.
-                largest[i] = if value.abs() > largest[i] {
-                    value.abs()
-                } else {
-                    largest[i]
-                };
-            }
-        }
-    }
-    let mut scale = [0.0; TRIANGLES];
-    for i in 0..TRIANGLES {
-        let usable = (largest[i] > 0.0) & (largest[i] < f64::INFINITY);
-        scale[i] = if usable { 1.0 / largest[i] } else { 0.0 };
-    }
-    let mut out = [[[0.0; TRIANGLES]; 3]; 3];
-    for corner in 0..3 {
-        for i in 0..TRIANGLES {
-            out[0][corner][i] = (edges[corner][0][i] * sign[i] * scale[i]) as f32;
-            out[1][corner][i] = (edges[corner][1][i] * sign[i] * scale[i]) as f32;
-            out[2][corner][i] = (at_anchor[corner][i] * scale[i]) as f32;
-        }
-    }
-    out
-}
-
-#[inline(always)]
-fn narrow(values: &Each<f64>) -> Each<f32> {
-    let mut out = [0.0; TRIANGLES];
-    for i in 0..TRIANGLES {
-        out[i] = values[i] as f32;
-    }
-    out
 }
 
 impl Planes {
@@ -227,13 +218,8 @@ impl Planes {
 mod tests {
     use super::*;
     use crate::geometry::screen::{TrianglePlanes, outcode};
-    use crate::simd::{Simd, SimdLevel, dispatch};
+    use crate::simd::{SimdLevel, dispatch};
     use proptest::prelude::*;
-
-    #[inline(always)]
-    fn planes_of<S: Simd>(_simd: S, corners: &Corners) -> Planes {
-        corners.planes()
-    }
 
     fn corner() -> impl Strategy<Value = PixelPoint> {
         let w = prop_oneof![0.1..10.0_f64, 1e-6..1e6_f64];
@@ -262,7 +248,7 @@ mod tests {
                 corners.set(i, *points, *anchor);
             }
             for level in SimdLevel::available().filter_map(SimdLevel::token) {
-                let planes = dispatch!(level, simd => planes_of(simd, &corners));
+                let planes = dispatch!(level, simd => corners.planes(simd));
                 for (i, &(points, anchor)) in triangles.iter().enumerate() {
                     let scalar = TrianglePlanes::new(points);
                     prop_assert_eq!(planes.depth(i, anchor), scalar.depth(anchor));

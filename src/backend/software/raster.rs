@@ -6,7 +6,8 @@
 //! that no pixel of the blocks in question violates is left out; if every pixel violates one, so are the blocks. Any other changes
 //! its sign within 64 x 64 pixels, hence is nowhere larger than `63 * 2^24 < 2^30`: `i32` does not overflow.
 //!
-//! A piece that touches more than 4 x 4 blocks goes through **squares** of 16 x 16 pixels. Each is rejected, or entered with
+//! A **small** piece, whose edges are shorter than [`SMALL`] and which touches few blocks, needs no such questions: all numbers are
+//! small, and every block is tried. A piece that touches more than 4 x 4 blocks goes through **squares** of 16 x 16 pixels. Each is rejected, or entered with
 //! those edges only that cross it. A square also knows a depth that none of its pixels is farther than: a piece that nowhere comes
 //! nearer does not enter it. That depth rises when a piece covers the square without a gap, which is what large occluders do.
 //!
@@ -29,6 +30,9 @@ const SQUARES_ACROSS: usize = BLOCKS_ACROSS / SQUARE_BLOCKS;
 
 /// Three edges, and the right and the lower border of the image.
 const MOST_EDGES: usize = 5;
+
+/// Edges shorter than this along both axes, in sub-pixels, have values that fit `i32` wherever a piece of at most 2 x 2 blocks looks.
+const SMALL: i32 = 16 << SUBPIXEL_BITS;
 
 /// Most vectors in a block: at four lanes.
 const MOST_PARTS: usize = 4;
@@ -92,7 +96,7 @@ struct BlockRange {
     y1: usize,
 }
 
-/// One edge of a piece inside a tile, in whole pixels.
+/// One edge of a piece, in whole pixels.
 #[derive(Clone, Copy, Default)]
 struct TileEdge {
     /// Value at the tile's first pixel; may be outside of `i32`.
@@ -103,17 +107,27 @@ struct TileEdge {
     dy: i32,
 }
 
-/// Edges, of which the first `count` are meant.
+/// One edge of a piece in some blocks, in whole pixels.
+#[derive(Clone, Copy, Default)]
+struct BlockEdge {
+    /// Value at the first pixel of the first block.
+    start: i32,
+    /// Change per pixel to the right.
+    dx: i32,
+    /// Change per pixel down.
+    dy: i32,
+}
+
+/// The edges of a piece in a tile, of which the first `count` are meant.
 #[derive(Clone, Copy)]
-struct Edges {
+struct TileEdges {
     edges: [TileEdge; MOST_EDGES],
     count: usize,
 }
 
-impl Edges {
-    /// Those of a piece.
+impl TileEdges {
     #[inline(always)]
-    fn of_piece(piece: &Piece, tile: &Tile) -> Self {
+    fn new(piece: &Piece, tile: &Tile) -> Self {
         let mut edges = [TileEdge::default(); MOST_EDGES];
         for i in 0..3 {
             let edge = EdgeFunction::new(piece.corners[i], piece.corners[(i + 1) % 3]);
@@ -134,27 +148,22 @@ impl Edges {
             dx: 0,
             dy: -1,
         };
-        let side = TILE_SIDE as i32;
-        let is_inner = tile.width == side && tile.height == side;
         Self {
             edges,
-            count: if is_inner { 3 } else { MOST_EDGES },
+            count: if is_inner(tile) { 3 } else { MOST_EDGES },
         }
     }
 
     /// Those that some but not all pixels of the blocks violate; `None` if all violate one.
     #[inline(always)]
-    fn crossing(&self, range: BlockRange) -> Option<Self> {
+    fn crossing(&self, range: BlockRange) -> Option<BlockEdges> {
         let side = BLOCK_SIDE as i64;
         let [x0, y0] = [range.x0 as i64 * side, range.y0 as i64 * side];
         let [across, down] = [
             (range.x1 - range.x0 + 1) as i64 * side - 1,
             (range.y1 - range.y0 + 1) as i64 * side - 1,
         ];
-        let mut crossing = Self {
-            edges: self.edges,
-            count: 0,
-        };
+        let mut crossing = BlockEdges::default();
         for edge in &self.edges[..self.count] {
             let [dx, dy] = [i64::from(edge.dx), i64::from(edge.dy)];
             let start = edge.origin + dx * x0 + dy * y0;
@@ -162,12 +171,58 @@ impl Edges {
                 return None;
             }
             if start + (dx * across).min(0) + (dy * down).min(0) < 0 {
-                crossing.edges[crossing.count] = *edge;
+                crossing.edges[crossing.count] = BlockEdge {
+                    start: start as i32,
+                    dx: edge.dx,
+                    dy: edge.dy,
+                };
                 crossing.count += 1;
             }
         }
         Some(crossing)
     }
+}
+
+/// Edges that cross some blocks; those from `count` on are zero, and stop nothing.
+#[derive(Clone, Copy, Default)]
+struct BlockEdges {
+    edges: [BlockEdge; MOST_EDGES],
+    count: usize,
+}
+
+/// Whether no pixel of the tile is outside of the image.
+#[inline(always)]
+fn is_inner(tile: &Tile) -> bool {
+    tile.width == TILE_SIDE as i32 && tile.height == TILE_SIDE as i32
+}
+
+/// The edges of a small piece in the blocks from that on whose first pixel is `(x, y)` of the image; `None` if it is not small.
+///
+/// An edge shorter than [`SMALL`] along each axis, in sub-pixels, and seen from a pixel less than twice as far from its ends, has
+/// values below `4 SMALL^2`.
+#[inline(always)]
+fn small_edges(piece: &Piece, [x, y]: [i32; 2]) -> Option<[BlockEdge; 3]> {
+    let center = |v: i32| (v << SUBPIXEL_BITS) + (1 << (SUBPIXEL_BITS - 1));
+    let [x, y] = [center(x), center(y)];
+    let mut edges = [BlockEdge::default(); 3];
+    let mut longest = 0;
+    for i in 0..3 {
+        let ([px, py], [qx, qy]) = (piece.corners[i], piece.corners[(i + 1) % 3]);
+        let [dx, dy] = [qx - px, qy - py];
+        longest |= dx.abs() | dy.abs();
+        let top_left = (dy > 0) | ((dy == 0) & (dx < 0));
+        // Wraps only where it is not used.
+        let value = dy
+            .wrapping_mul(x - px)
+            .wrapping_sub(dx.wrapping_mul(y - py))
+            .wrapping_sub(i32::from(!top_left));
+        edges[i] = BlockEdge {
+            start: value >> SUBPIXEL_BITS,
+            dx: dy,
+            dy: -dx,
+        };
+    }
+    (longest < SMALL).then_some(edges)
 }
 
 /// A tile that is being drawn.
@@ -191,8 +246,17 @@ impl<S: Simd> Canvas<'_, S> {
             x1: block(pixels.x1),
             y1: block(pixels.y1),
         };
-        let edges = Edges::of_piece(piece, self.tile);
-        if range.x1 - range.x0 < SQUARE_BLOCKS && range.y1 - range.y0 < SQUARE_BLOCKS {
+        let blocks = [range.x1 - range.x0, range.y1 - range.y0];
+        if blocks[0] < 2 && blocks[1] < 2 && is_inner(self.tile) {
+            let [left, top] = [range.x0, range.y0].map(|block| (block * BLOCK_SIDE) as i32);
+            let first = [self.tile.origin[0] + left, self.tile.origin[1] + top];
+            if let Some(edges) = small_edges(piece, first) {
+                self.draw_inside(simd, piece, edges, range);
+                return;
+            }
+        }
+        let edges = TileEdges::new(piece, self.tile);
+        if blocks[0] < SQUARE_BLOCKS && blocks[1] < SQUARE_BLOCKS {
             if let Some(edges) = edges.crossing(range) {
                 self.draw_blocks(simd, piece, &edges, range);
             }
@@ -211,7 +275,7 @@ impl<S: Simd> Canvas<'_, S> {
         &mut self,
         simd: S,
         piece: &Piece,
-        edges: &Edges,
+        edges: &TileEdges,
         range: BlockRange,
         [x, y]: [usize; 2],
     ) {
@@ -255,14 +319,19 @@ impl<S: Simd> Canvas<'_, S> {
     }
 
     #[inline(always)]
-    fn draw_blocks(&mut self, simd: S, piece: &Piece, edges: &Edges, range: BlockRange) {
+    fn draw_blocks(
+        &mut self,
+        simd: S,
+        piece: &Piece,
+        edges: &BlockEdges,
+        range: BlockRange,
+    ) {
         let all = &edges.edges;
         match edges.count {
             0 => self.draw_inside(simd, piece, [], range),
             1 => self.draw_inside(simd, piece, [all[0]], range),
             2 => self.draw_inside(simd, piece, [all[0], all[1]], range),
             3 => self.draw_inside(simd, piece, [all[0], all[1], all[2]], range),
-            // Edges that have not been used stay those of another edge, which does no harm.
             _ => self.draw_inside(simd, piece, *all, range),
         }
     }
@@ -273,60 +342,52 @@ impl<S: Simd> Canvas<'_, S> {
         &mut self,
         simd: S,
         piece: &Piece,
-        edges: [TileEdge; N],
+        edges: [BlockEdge; N],
         range: BlockRange,
     ) {
         let lanes = self.lanes;
-        let width = S::i32s::LEN;
+        let (width, parts) = (S::i32s::LEN, Lanes::<S>::parts());
+        let side = BLOCK_SIDE as i32;
         let zero = S::i32s::splat(simd, 0);
-        let mut inside_block = [[zero; MOST_PARTS]; N];
+        // Values at the pixels of the first block of a row of blocks.
+        let mut row_values = [[zero; MOST_PARTS]; N];
         for k in 0..N {
-            for part in 0..Lanes::<S>::parts() {
-                inside_block[k][part] =
-                    lanes.column[part] * edges[k].dx + lanes.row[part] * edges[k].dy;
+            for part in 0..parts {
+                row_values[k][part] =
+                    lanes.column[part] * edges[k].dx + lanes.row[part] * edges[k].dy + edges[k].start;
             }
         }
-        let side = BLOCK_SIDE as i32;
         let plane = &piece.depth;
-        let [slope_x, slope_y] = [
-            S::f32s::splat(simd, plane.dx),
-            S::f32s::splat(simd, plane.dy),
-        ];
-        let base = S::f32s::splat(simd, plane.base);
+        let slope = S::f32s::splat(simd, plane.dx);
         let (near, far) = (
             S::f32s::splat(simd, plane.max),
             S::f32s::splat(simd, plane.min),
         );
         let slot = S::u32s::splat(simd, piece.slot);
-        let from_anchor = [
-            self.tile.origin[0] - plane.anchor[0],
-            self.tile.origin[1] - plane.anchor[1],
-        ];
+        let left = self.tile.origin[0] + range.x0 as i32 * side - plane.anchor[0];
+        let top = self.tile.origin[1] + range.y0 as i32 * side - plane.anchor[1];
         for y in range.y0..=range.y1 {
-            for x in range.x0..=range.x1 {
-                let [left, top] = [x as i32 * side, y as i32 * side];
-                let mut corner = [0; N];
+            let above = top + (y - range.y0) as i32 * side;
+            for part in 0..parts {
+                let row: S::f32s = (lanes.row[part] + above).to_float();
+                let row_depth = row * plane.dy + plane.base;
+                let mut column: S::f32s = (lanes.column[part] + left).to_float();
+                let mut values = [zero; N];
                 for k in 0..N {
-                    let value = edges[k].origin
-                        + i64::from(edges[k].dx) * i64::from(left)
-                        + i64::from(edges[k].dy) * i64::from(top);
-                    corner[k] = value as i32;
+                    values[k] = row_values[k][part];
+                    row_values[k][part] += edges[k].dy * side;
                 }
-                let block = y * BLOCKS_ACROSS + x;
-                for part in 0..Lanes::<S>::parts() {
+                for x in range.x0..=range.x1 {
                     let mut signs = zero;
                     for k in 0..N {
-                        signs |= inside_block[k][part] + corner[k];
+                        signs |= values[k];
+                        values[k] += edges[k].dx * side;
                     }
                     let inside = signs.simd_ge(zero);
-                    if N > 0 && !inside.any_true() {
-                        continue;
-                    }
+                    let depth = (row_depth + slope * column).max(far).min(near);
+                    column += side as f32;
+                    let block = y * BLOCKS_ACROSS + x;
                     let at = block * BLOCK_PIXELS + part * width;
-                    let column: S::f32s = (lanes.column[part] + (left + from_anchor[0])).to_float();
-                    let row: S::f32s = (lanes.row[part] + (top + from_anchor[1])).to_float();
-                    let depth = (base + slope_y * row) + slope_x * column;
-                    let depth = depth.max(far).min(near);
                     let stored = S::f32s::from_slice(simd, &self.depth[at..at + width]);
                     let wins = inside & depth.simd_gt(stored);
                     if wins.any_true() {

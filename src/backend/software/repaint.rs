@@ -17,12 +17,13 @@ use super::setup::corners;
 use super::tile::{
     BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, Bounds, Grid, TILE_SIDE, Tile, TileBox, block_corner,
 };
-use super::transform::Vertices;
+use super::transform::VerticesOf;
 use super::visible::Visible;
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
 use crate::geometry::screen::Interpolator;
 use crate::illumination::ShadingKit;
+use crate::output::Encoding;
 use crate::output::encode::encode_lanes;
 use crate::parallel::Exec;
 use crate::simd::{Simd, dispatch};
@@ -68,7 +69,7 @@ pub(super) fn plan(
     painter: &Painter<'_>,
     visible: &Visible,
     grid: Grid,
-    vertices: &Vertices,
+    vertices: VerticesOf<'_>,
     patches: &[Patch],
 ) {
     jobs.clear();
@@ -209,7 +210,7 @@ fn paint_job<'a, S: Simd>(
     match patch.fill {
         Fill::Gouraud(colours) => {
             let fill = GouraudFill::new(patch.corners, colours);
-            paint_patch(simd, tile, job, painter.serial, &planes, patch, &fill, work)
+            paint_patch(simd, tile, job, painter, &planes, patch, &fill, work)
         }
         Fill::Phong { lights, remainder } => {
             let fill = PhongFill {
@@ -219,7 +220,7 @@ fn paint_job<'a, S: Simd>(
                 normals: gather(&world.normals, owner.vertices),
                 remainder,
             };
-            paint_patch(simd, tile, job, painter.serial, &planes, patch, &fill, work)
+            paint_patch(simd, tile, job, painter, &planes, patch, &fill, work)
         }
     }
 }
@@ -230,7 +231,7 @@ fn paint_patch<S: Simd>(
     simd: S,
     tile: &mut Tile,
     job: &Job,
-    serial: u64,
+    painter: &Painter<'_>,
     planes: &Interpolator,
     patch: &Patch,
     fill: &impl PatchFill,
@@ -246,11 +247,18 @@ fn paint_patch<S: Simd>(
     while search.is_open() {
         let batch = &mut work.batch;
         batch.collect(simd, tile, job.slot, &work.rows, &mut search);
-        painted += batch.colour(simd, tile.origin, planes, edges.as_ref(), fill);
+        painted += batch.colour(
+            simd,
+            painter.geometry.view.encoding,
+            tile.origin,
+            planes,
+            edges.as_ref(),
+            fill,
+        );
         changed |= batch.put_back(simd, tile);
     }
     if changed.any_true() {
-        tile.serial = serial;
+        tile.serial = painter.serial;
     }
     painted
 }
@@ -413,6 +421,7 @@ impl Batch {
     fn colour<S: Simd>(
         &mut self,
         simd: S,
+        encoding: Encoding,
         origin: [i32; 2],
         planes: &Interpolator,
         edges: Option<&PatchEdges>,
@@ -437,7 +446,7 @@ impl Batch {
             let mut colour = S::u32s::splat(simd, NOT_PAINTED);
             // Rare, except where the slack says nothing and a large triangle is searched for a small patch.
             if bits != 0 {
-                colour = mask.select(encode_lanes(simd, fill.colours(simd, w)), colour);
+                colour = mask.select(encode_lanes(simd, encoding, fill.colours(simd, w)), colour);
             }
             colour.store_slice(&mut self.colour[at..at + lanes]);
             painted += bits.count_ones();

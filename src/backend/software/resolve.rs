@@ -55,7 +55,8 @@ pub(super) fn resolve_tile<S: Simd>(
     painter: &Painter<'_>,
     paint: BasePaint<'_>,
 ) {
-    let background = encode_lanes(simd, splat3(simd, painter.world().background));
+    let encoding = painter.geometry.view.encoding;
+    let background = encode_lanes(simd, encoding, splat3(simd, painter.world().background));
     fill_background(tile, background[0], painter.serial);
     if tile.owned.is_empty() {
         return;
@@ -151,6 +152,7 @@ fn paint_tile<S: Simd>(
 ) {
     let lanes = S::u32s::LEN;
     let background = splat3(simd, painter.world().background);
+    let encoding = painter.geometry.view.encoding;
     let iota = S::i32s::from_fn(simd, |i| i as i32);
     let mut changed = S::mask32s::splat(simd, false);
     for block in tile.owned.iter() {
@@ -171,7 +173,7 @@ fn paint_tile<S: Simd>(
                 row: row + corner[1],
             };
             let linear = surface.colours(simd, owners, covered, background);
-            let colour = encode_lanes(simd, linear);
+            let colour = encode_lanes(simd, encoding, linear);
             let stored = &mut tile.colour[at..at + lanes];
             changed |= colour.simd_ne(S::u32s::from_slice(simd, stored));
             colour.store_slice(stored);

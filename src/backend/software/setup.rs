@@ -16,7 +16,7 @@ use super::fit;
 use super::planes::{Corners, TRIANGLES};
 use super::shares::Share;
 use super::tile::{Bounds, Grid};
-use super::transform::{SnappedVertex, Vertices};
+use super::transform::{SnappedVertex, VerticesOf};
 use crate::backend::Geometry;
 use crate::geometry::screen::{
     DepthPlane, Interpolator, PixelBox, SUBPIXEL_BITS, TrianglePlanes, clip, doubled_area, snap,
@@ -75,7 +75,7 @@ impl Drawn {
 
 /// The corners of a triangle in homogeneous pixel space.
 #[inline(always)]
-pub(super) fn corners(vertices: &Vertices, triangle: [u32; 3]) -> [PixelPoint; 3] {
+pub(super) fn corners(vertices: VerticesOf<'_>, triangle: [u32; 3]) -> [PixelPoint; 3] {
     [
         vertices.point(triangle[0]),
         vertices.point(triangle[1]),
@@ -86,11 +86,11 @@ pub(super) fn corners(vertices: &Vertices, triangle: [u32; 3]) -> [PixelPoint; 3
 /// Sets up and bins a share's triangles.
 #[inline(always)]
 pub(super) fn set_up<S: Simd>(
-    _simd: S,
+    simd: S,
     share: &mut Share,
     geometry: Geometry<'_>,
     grid: Grid,
-    vertices: &Vertices,
+    vertices: VerticesOf<'_>,
 ) {
     let setup = Setup {
         geometry,
@@ -103,10 +103,10 @@ pub(super) fn set_up<S: Simd>(
         let first = range.start;
         for (index, triangles) in geometry.world.triangles[range].chunks(BATCH).enumerate() {
             let first = (first + index * BATCH) as u32;
-            setup.batch(share, &mut pending, first, triangles);
+            setup.batch(simd, share, &mut pending, first, triangles);
         }
     }
-    setup.flush(share, &mut pending);
+    setup.flush(simd, share, &mut pending);
     bin(share, grid);
 }
 
@@ -133,7 +133,7 @@ enum Verdict {
 
 impl Batch {
     #[inline(always)]
-    fn gather(vertices: &Vertices, triangles: &[[u32; 3]]) -> Self {
+    fn gather(vertices: VerticesOf<'_>, triangles: &[[u32; 3]]) -> Self {
         let mut batch = Self {
             x: [[0; BATCH]; 3],
             y: [[0; BATCH]; 3],
@@ -198,13 +198,20 @@ impl Batch {
 struct Setup<'a> {
     geometry: Geometry<'a>,
     grid: Grid,
-    vertices: &'a Vertices,
+    vertices: VerticesOf<'a>,
 }
 
 impl Setup<'_> {
     /// Sets up consecutive triangles, the first of which is number `first`.
     #[inline(always)]
-    fn batch(&self, share: &mut Share, pending: &mut Pending, first: u32, triangles: &[[u32; 3]]) {
+    fn batch<S: Simd>(
+        &self,
+        simd: S,
+        share: &mut Share,
+        pending: &mut Pending,
+        first: u32,
+        triangles: &[[u32; 3]],
+    ) {
         let batch = Batch::gather(self.vertices, triangles);
         let areas = batch.doubled_areas();
         let [x0, x1] = Batch::pixel_ranges(&batch.x, self.grid.width);
@@ -237,7 +244,7 @@ impl Setup<'_> {
                 Verdict::BackFacing => share.counts.back_facing += 1,
                 Verdict::Clip => {
                     // In order.
-                    self.flush(share, pending);
+                    self.flush(simd, share, pending);
                     self.clip(share, first + i as u32, triangle);
                 }
                 Verdict::Draw => {
@@ -255,7 +262,7 @@ impl Setup<'_> {
                         bounds,
                     );
                     if pending.len == TRIANGLES {
-                        self.flush(share, pending);
+                        self.flush(simd, share, pending);
                     }
                 }
             }
@@ -264,12 +271,12 @@ impl Setup<'_> {
 
     /// Finishes the triangles that wait for their planes.
     #[inline(always)]
-    fn flush(&self, share: &mut Share, pending: &mut Pending) {
+    fn flush<S: Simd>(&self, simd: S, share: &mut Share, pending: &mut Pending) {
         if pending.len == 0 {
             return;
         }
         let world = self.geometry.world;
-        let planes = pending.corners.planes();
+        let planes = pending.corners.planes(simd);
         for (i, waiting) in pending.triangles[..pending.len].iter().enumerate() {
             let mut depth = planes.depth(i, waiting.bounds.anchor());
             if world.backs.contains(&waiting.id) {
@@ -369,7 +376,7 @@ impl Pending {
     #[inline(always)]
     fn push(
         &mut self,
-        all: &Vertices,
+        all: VerticesOf<'_>,
         id: u32,
         vertices: [u32; 3],
         snapped: [[i32; 2]; 3],

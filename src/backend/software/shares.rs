@@ -249,6 +249,7 @@ mod tests {
                 height: 1,
                 pixel_from_world: DMat4::IDENTITY,
                 eye: Eye::Point([0.0; 3]),
+                encoding: Default::default(),
             },
         );
         // One after the other in the same memory.

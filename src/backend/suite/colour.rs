@@ -1,10 +1,9 @@
 //! What colours pixels get.
 
-use super::fixture::{BACKGROUND, Fixture, Picture, Random, assert_near, codes};
+use super::fixture::{BACKGROUND, Fixture, Random, assert_near};
 use crate::backend::{BasePaint, Interpolation};
 use crate::geometry::Vec3s;
 use crate::illumination::reference::shade;
-use crate::output::encode::encode;
 use glam::DVec3;
 
 /// The contract's tolerance for interpolated colours, in codes, before rounding.
@@ -12,17 +11,17 @@ const TOLERANCE: f64 = 1.5;
 
 pub(super) fn the_background_is_where_nothing_is(fixture: &Fixture<'_>) {
     for colour in [BACKGROUND, [0.0; 3], [1.0; 3], [0.2, 0.001, 0.5]] {
-        let mut picture = Picture::flat(70, 41);
+        let mut picture = fixture.flat(70, 41);
         picture.world.background = colour;
         let frame = fixture.image(&picture, BasePaint::Gouraud(&Vec3s::default()));
         for &pixel in frame.pixels() {
-            assert_near(pixel, codes(colour), 0.1, "an empty world");
+            assert_near(pixel, picture.codes(colour), 0.1, "an empty world");
         }
     }
 }
 
 pub(super) fn flat_triangles_have_their_colour(fixture: &Fixture<'_>) {
-    let mut picture = Picture::flat(40, 30);
+    let mut picture = fixture.flat(40, 30);
     picture.add_facing([
         [-90.0, -90.0, 0.5],
         [-90.0, 200.0, 0.5],
@@ -33,20 +32,21 @@ pub(super) fn flat_triangles_have_their_colour(fixture: &Fixture<'_>) {
         colours.push(colour);
         let frame = fixture.image(&picture, BasePaint::Flat(&colours));
         for &pixel in frame.pixels() {
-            assert_near(pixel, codes(colour), 0.5, "a flat triangle");
+            assert_near(pixel, picture.codes(colour), 0.5, "a flat triangle");
         }
     }
 }
 
 /// What interpolation as declared shows, in codes.
 fn interpolated(
-    interpolation: Interpolation,
+    fixture: &Fixture<'_>,
     [perspective, on_screen]: [[f64; 3]; 2],
     colours: [[f32; 3]; 3],
 ) -> [f64; 3] {
     std::array::from_fn(|channel| {
         let linear = colours.map(|c| f64::from(c[channel]));
-        match interpolation {
+        let encode = |light| fixture.encoding.encode(light);
+        match fixture.capabilities.interpolation {
             Interpolation::LinearPerspective => {
                 encode((0..3).map(|i| perspective[i] * linear[i]).sum())
             }
@@ -60,9 +60,9 @@ pub(super) fn gouraud_is_interpolated_as_declared(fixture: &Fixture<'_>) {
     let mut compared = 0;
     for round in 0..60 {
         let mut picture = if round % 2 == 0 {
-            Picture::flat(150, 100)
+            fixture.flat(150, 100)
         } else {
-            Picture::perspective(150, 100)
+            fixture.perspective(150, 100)
         };
         let mut corner = || {
             if round % 2 == 0 {
@@ -84,7 +84,7 @@ pub(super) fn gouraud_is_interpolated_as_declared(fixture: &Fixture<'_>) {
         for (at, [x, y], id) in picture.owners().pixels(false) {
             if id.is_some() {
                 let weights = picture.weights(0, x, y);
-                let want = interpolated(fixture.capabilities.interpolation, weights, corners);
+                let want = interpolated(fixture, weights, corners);
                 let what = format!("round {round}, pixel {x}, {y}");
                 assert_near(frame.pixels()[at], want, TOLERANCE, &what);
                 compared += 1;
@@ -98,7 +98,7 @@ pub(super) fn gouraud_is_interpolated_as_declared(fixture: &Fixture<'_>) {
 }
 
 pub(super) fn colours_out_of_range_are_clamped(fixture: &Fixture<'_>) {
-    let mut picture = Picture::flat(20, 20);
+    let mut picture = fixture.flat(20, 20);
     picture.add_facing([
         [-90.0, -90.0, 0.5],
         [-90.0, 200.0, 0.5],
@@ -135,7 +135,7 @@ pub(super) fn phong_is_the_illumination_equation(fixture: &Fixture<'_>) {
     let mut random = Random(22);
     let mut compared = 0;
     for _ in 0..8 {
-        let mut picture = Picture::perspective(120, 90);
+        let mut picture = fixture.perspective(120, 90);
         let mut corner = || {
             let z = random.range(1.0, 6.0);
             [z * random.range(-0.8, 0.8), z * random.range(-0.6, 0.6), z]
@@ -166,7 +166,7 @@ pub(super) fn phong_is_the_illumination_equation(fixture: &Fixture<'_>) {
             );
             // Where light grazes, a rounding decides whether there is a highlight.
             if shaded.smallest_cosine > 1e-4 {
-                let want = shaded.rgb.map(encode);
+                let want = shaded.rgb.map(|c| fixture.encoding.encode(c));
                 assert_near(frame.pixels()[at], want, 0.5, &format!("pixel {x}, {y}"));
                 compared += 1;
             }

@@ -1,6 +1,6 @@
 //! Which pixels triangles get.
 
-use super::fixture::{BACKGROUND, Fixture, Picture, Random, assert_near, codes};
+use super::fixture::{BACKGROUND, Fixture, Picture, Random, assert_near};
 use crate::backend::BasePaint;
 
 const SIZES: [(u32, u32); 6] = [(1, 1), (7, 5), (64, 64), (97, 33), (300, 70), (257, 129)];
@@ -44,7 +44,7 @@ pub(super) fn the_nearest_triangle_owns_a_pixel(fixture: &Fixture<'_>) {
             for (at, pixel, id) in picture.owners().pixels(fixture.capabilities.ids) {
                 let colour = id.map_or(BACKGROUND, |id| colours.get(id as usize));
                 let what = format!("{width}x{height}, pixel {pixel:?} owned by {id:?}");
-                assert_near(frame.pixels()[at], codes(colour), 1.0, &what);
+                assert_near(frame.pixels()[at], picture.codes(colour), 1.0, &what);
             }
         }
     }
@@ -87,7 +87,7 @@ pub(super) fn triangles_that_share_edges_leave_no_gap(fixture: &Fixture<'_>) {
             colours
         };
         let frame = fixture.image(&picture, BasePaint::Gouraud(&colours));
-        let background = codes(BACKGROUND);
+        let background = picture.codes(BACKGROUND);
         for (at, pixel) in frame.pixels().iter().enumerate() {
             let (x, y) = (at as u32 % width, at as u32 / width);
             assert!(
@@ -130,7 +130,7 @@ pub(super) fn only_visible_ranges_are_drawn(fixture: &Fixture<'_>) {
         for (at, pixel, id) in picture.owners().pixels(fixture.capabilities.ids) {
             let colour = id.map_or(BACKGROUND, |id| colours.get(id as usize));
             let what = format!("ranges {:?}, pixel {pixel:?}", picture.visible);
-            assert_near(frame.pixels()[at], codes(colour), 1.0, &what);
+            assert_near(frame.pixels()[at], picture.codes(colour), 1.0, &what);
         }
     }
 }

@@ -5,8 +5,7 @@ use crate::geometry::Vec3s;
 use crate::geometry::screen::{
     EdgeFunction, PixelBox, TrianglePlanes, clip, doubled_area, normalized_weights, snap,
 };
-use crate::output::Frame;
-use crate::output::encode::encode;
+use crate::output::{Encoding, Frame};
 use crate::parallel::Exec;
 use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, View, World};
 use crate::simd::{Level, SimdLevel};
@@ -21,20 +20,40 @@ pub(super) struct Fixture<'a> {
     make: &'a dyn Fn() -> Box<dyn Backend>,
     pub(super) capabilities: Capabilities,
     pub(super) exec: Exec,
+    /// How images store light.
+    pub(super) encoding: Encoding,
 }
 
 impl<'a> Fixture<'a> {
-    pub(super) fn new(make: &'a dyn Fn() -> Box<dyn Backend>) -> Self {
+    pub(super) fn new(make: &'a dyn Fn() -> Box<dyn Backend>, encoding: Encoding) -> Self {
         let level = SimdLevel::detect().token().unwrap_or(Level::new());
         Self {
             make,
             capabilities: make().capabilities(),
             exec: Exec { level, threads: 1 },
+            encoding,
         }
     }
 
     pub(super) fn backend(&self) -> Box<dyn Backend> {
         (self.make)()
+    }
+
+    /// An empty world in which coordinates are pixels and reversed depth.
+    pub(super) fn flat(&self, width: u32, height: u32) -> Picture {
+        self.encoded(Picture::flat(width, height))
+    }
+
+    /// An empty world seen from the origin along +z, y down; near plane at 0.5, far plane at 100.
+    pub(super) fn perspective(&self, width: u32, height: u32) -> Picture {
+        self.encoded(Picture::perspective(width, height))
+    }
+
+    fn encoded(&self, picture: Picture) -> Picture {
+        Picture {
+            view: picture.view.with_encoding(self.encoding),
+            ..picture
+        }
     }
 
     /// What a new backend shows of a picture.
@@ -73,6 +92,7 @@ impl Picture {
             height,
             pixel_from_world: DMat4::IDENTITY,
             eye: Eye::Direction([0.0, 0.0, 1.0]),
+            encoding: Encoding::default(),
         };
         Self::new(view)
     }
@@ -92,6 +112,7 @@ impl Picture {
                 DVec4::new(0.0, 0.0, near * far / (far - near), 0.0),
             ),
             eye: Eye::Point([0.0; 3]),
+            encoding: Encoding::default(),
         };
         Self::new(view)
     }
@@ -166,6 +187,11 @@ impl Picture {
         self.world.triangles.push(corners);
         self.world.triangle_material.push(0);
         self.visible = std::iter::once(0..self.world.triangles.len() as u32).collect();
+    }
+
+    /// The codes of a linear colour.
+    pub(super) fn codes(&self, linear: [f32; 3]) -> [f64; 3] {
+        linear.map(|c| self.view.encoding.encode(f64::from(c)))
     }
 
     pub(super) fn geometry(&self) -> Geometry<'_> {
@@ -321,9 +347,4 @@ pub(super) fn assert_near(pixel: [u8; 4], codes: [f64; 3], tolerance: f64, what:
         a == 255 && is_near,
         "{what}: {pixel:?} instead of codes {codes:?} (tolerance {tolerance})"
     );
-}
-
-/// The codes of a linear colour.
-pub(super) fn codes(linear: [f32; 3]) -> [f64; 3] {
-    linear.map(|c| encode(f64::from(c)))
 }

@@ -23,6 +23,7 @@ mod repainting;
 mod robustness;
 
 use super::{Backend, Capabilities};
+use crate::output::Encoding;
 use fixture::Fixture;
 
 /// Runs all checks on backends that `make` makes, each of them new and without an image.
@@ -30,7 +31,7 @@ use fixture::Fixture;
 /// # Panics
 /// When the backend breaks its contract; the message says how.
 pub fn check(make: impl Fn() -> Box<dyn Backend>) {
-    let fixture = Fixture::new(&make);
+    let fixture = Fixture::new(&make, Encoding::default());
     let Capabilities {
         ids,
         per_pixel,
@@ -42,23 +43,26 @@ pub fn check(make: impl Fn() -> Box<dyn Backend>) {
     coverage::only_visible_ranges_are_drawn(&fixture);
     coverage::visible_triangles_and_their_pixels_are_told(&fixture);
 
-    colour::the_background_is_where_nothing_is(&fixture);
-    colour::flat_triangles_have_their_colour(&fixture);
-    colour::gouraud_is_interpolated_as_declared(&fixture);
-    colour::colours_out_of_range_are_clamped(&fixture);
-    if per_pixel {
-        colour::phong_is_the_illumination_equation(&fixture);
+    for encoding in Encoding::ALL {
+        let fixture = Fixture::new(&make, encoding);
+        colour::the_background_is_where_nothing_is(&fixture);
+        colour::flat_triangles_have_their_colour(&fixture);
+        colour::gouraud_is_interpolated_as_declared(&fixture);
+        colour::colours_out_of_range_are_clamped(&fixture);
+        if per_pixel {
+            colour::phong_is_the_illumination_equation(&fixture);
+        }
+        if make().capabilities().refines_in_place() {
+            repainting::patches_paint_what_their_triangle_owns(&fixture);
+        } else {
+            repainting::parts_take_the_place_of_their_triangle(&fixture);
+        }
     }
 
     presenting::only_what_is_missing_is_written(&fixture);
     presenting::targets_of_any_layout_are_filled(&fixture);
     presenting::a_target_of_another_size_is_left_alone(&fixture);
 
-    if make().capabilities().refines_in_place() {
-        repainting::patches_paint_what_their_triangle_owns(&fixture);
-    } else {
-        repainting::parts_take_the_place_of_their_triangle(&fixture);
-    }
     if ids {
         coverage::visible_pixels_are_counted(&fixture);
     }

@@ -1,21 +1,21 @@
 //! How refined triangles are drawn: patch by patch into an image, or all at once.
 
-use super::fixture::{Fixture, Picture, Random, assert_near, codes, draw};
+use super::fixture::{Fixture, Picture, Random, assert_near, draw};
 use crate::backend::{BasePaint, Fill, Patch, RefinedPart};
 use crate::geometry::Vec3s;
 use crate::geometry::bary::{Bary, middles, quarters};
 use crate::output::Frame;
 
 /// A large triangle partly behind a smaller one.
-fn overlapping() -> Picture {
-    let mut picture = Picture::flat(150, 110);
+fn overlapping(fixture: &Fixture<'_>) -> Picture {
+    let mut picture = fixture.flat(150, 110);
     picture.add_facing([[5.0, 4.0, 0.4], [20.0, 105.0, 0.4], [140.0, 60.0, 0.4]]);
     picture.add_facing([[30.0, 30.0, 0.8], [40.0, 70.0, 0.8], [80.0, 50.0, 0.8]]);
     picture
 }
 
 pub(super) fn patches_paint_what_their_triangle_owns(fixture: &Fixture<'_>) {
-    let picture = overlapping();
+    let picture = overlapping(fixture);
     let colours = Random(41).colours(6);
     let mut backend = fixture.backend();
     let before = draw(
@@ -59,7 +59,7 @@ pub(super) fn patches_paint_what_their_triangle_owns(fixture: &Fixture<'_>) {
         }
         let quarter = marks
             .iter()
-            .position(|&mark| (f64::from(got[0]) - codes(mark)[0]).abs() < 1.0);
+            .position(|&mark| (f64::from(got[0]) - picture.codes(mark)[0]).abs() < 1.0);
         let quarter = quarter.unwrap_or_else(|| panic!("pixel {pixel:?} is in no patch: {got:?}"));
         counts[quarter] += 1;
         let [weights, _] = picture.weights(0, pixel[0], pixel[1]);
@@ -75,7 +75,7 @@ pub(super) fn patches_paint_what_their_triangle_owns(fixture: &Fixture<'_>) {
 }
 
 pub(super) fn parts_take_the_place_of_their_triangle(fixture: &Fixture<'_>) {
-    let picture = overlapping();
+    let picture = overlapping(fixture);
     let mut random = Random(42);
     let colours = random.colours(6);
     let exec = fixture.exec;
@@ -112,7 +112,7 @@ pub(super) fn parts_take_the_place_of_their_triangle(fixture: &Fixture<'_>) {
         },
     );
     // The same as a world of its own.
-    let mut split = Picture::flat(150, 110);
+    let mut split = fixture.flat(150, 110);
     let mut split_colours = Vec3s::default();
     for part in &parts {
         split.add_facing(part.corners);
@@ -128,7 +128,7 @@ pub(super) fn parts_take_the_place_of_their_triangle(fixture: &Fixture<'_>) {
                 let colour = split_colours.get(part as usize);
                 assert_near(
                     got,
-                    codes(colour),
+                    picture.codes(colour),
                     1.0,
                     &format!("part {part}, pixel {pixel:?}"),
                 );

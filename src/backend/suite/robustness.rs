@@ -1,6 +1,6 @@
 //! Sizes, threads, nothing, and odd numbers.
 
-use super::fixture::{Fixture, Picture, Random, assert_near, codes, draw};
+use super::fixture::{Fixture, Picture, Random, assert_near, draw};
 use crate::backend::BasePaint;
 use crate::geometry::Vec3s;
 use crate::parallel::Exec;
@@ -114,7 +114,7 @@ pub(super) fn nothing_to_draw_is_drawn(fixture: &Fixture<'_>) {
             "nothing is visible of {:?}",
             picture.world.positions
         );
-        let background = codes(picture.world.background);
+        let background = picture.codes(picture.world.background);
         for &pixel in frame.pixels() {
             assert_near(pixel, background, 0.5, "background");
         }
@@ -174,7 +174,7 @@ pub(super) fn odd_numbers_do_no_harm(fixture: &Fixture<'_>) {
             flat.resize(picture.triangles() as usize);
             flat.z.fill(0.5);
             let frame = fixture.image(&picture, BasePaint::Flat(&flat));
-            let blue = codes([0.0, 0.0, 0.5]);
+            let blue = picture.codes([0.0, 0.0, 0.5]);
             assert_near(frame.pixels()[0], blue, 1.0, "in front of odd triangles");
         }
     }

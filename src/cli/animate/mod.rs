@@ -14,7 +14,7 @@ use film::{Destination, Film};
 use serde_json::json;
 use specula::frame::FrameStats;
 use specula::output::sequence::Shard;
-use specula::output::{Frame, Timing};
+use specula::output::{Encoding, Frame, Timing};
 use specula::scene::{Animation, Scene};
 use specula::schedule::Budget;
 use std::ops::ControlFlow;
@@ -136,7 +136,10 @@ impl Job<'_> {
         let size = args.machine.size;
         let budget = budget(args.budget, args.work);
         // Made from the scene at rest, whichever frame is the first, so that all parts of a film start from the same.
-        let mut engine = args.machine.engine(&self.scene, args.method)?;
+        // Films are sRGB.
+        let mut engine = args
+            .machine
+            .engine(&self.scene, args.method, Encoding::Srgb)?;
         let mut frame = Frame::new(size.width, size.height);
         if args.budget.is_some() {
             engine.warm_up(&self.scene, size.width, size.height);

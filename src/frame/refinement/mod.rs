@@ -256,7 +256,7 @@ impl Refinement {
             self.roots.push(Root {
                 triangle,
                 pixels: backend.visible_pixels(triangle),
-                prior: ranking::prior_error(world, base.colours(), triangle, is_pht),
+                prior: ranking::prior_error(world, view.encoding, base.colours(), triangle, is_pht),
                 is_pht,
                 progress: Progress::Waiting,
                 is_split: false,
@@ -294,7 +294,7 @@ impl Refinement {
                 mean(corners.map(|v| base.colours().get(v))),
             );
         }
-        self.samples.illuminate(exec, world, view.eye);
+        self.samples.illuminate(exec, world, view);
         for (sample, root) in self.roots.iter_mut().filter(is_sampled).enumerate() {
             let [r, g, b] = self.samples.deviation(sample);
             root.prior += ranking::CENTROID_SHARE * (r * r + g * g + b * b) / 3.0;

@@ -169,8 +169,7 @@ impl Refinement {
         if self.ranked_parts == self.parts.len() {
             return;
         }
-        self.samples
-            .illuminate(stage.exec, stage.world, stage.view.eye);
+        self.samples.illuminate(stage.exec, stage.world, stage.view);
         let fresh = std::mem::replace(&mut self.ranked_parts, self.parts.len());
         for (order, index) in (fresh..self.parts.len()).enumerate() {
             let first = order * SAMPLES_PER_PART;

@@ -167,7 +167,7 @@ impl Refinement {
         self.forest.illuminate(
             stage.exec,
             stage.world,
-            stage.view.eye,
+            stage.view,
             stage.base.colours(),
             &mut planted,
         );
@@ -280,7 +280,9 @@ impl Refinement {
             Shading::PerPixel(ActiveLights::all(count), [[0.0; 3]; 3])
         } else {
             self.units_for_bounds += cost::bounds(count) as u64;
-            let bounds = highlight::light_masks(stage.world, &stage.view.eye, root.triangle);
+            let view = stage.view;
+            let bounds =
+                highlight::light_masks(stage.world, &view.eye, view.encoding, root.triangle);
             let evaluated = bounds.active.diffuse.len() + bounds.active.specular.len();
             self.counters.light_terms += (2 * count - evaluated) as u64;
             if bounds.verdict == highlight::Verdict::Absent {

@@ -12,6 +12,7 @@ use super::drawn_once;
 use super::parts::{self, CUT, SAMPLES_PER_PART};
 use super::{Refinement, Root, Shading, Stage};
 use crate::geometry::Vec3s;
+use crate::output::Encoding;
 use crate::refine::LeafId;
 use crate::scene::World;
 use crate::schedule::cost;
@@ -39,14 +40,24 @@ pub(super) enum Action {
 /// What is added to the mean squared error of a triangle for what its centroid does not show: shading that changes by so
 /// many codes between corners deviates from linear by a fraction of it, and a highlight inside by more. A guess, to be
 /// replaced by an estimate when the triangle's turn comes.
-pub(super) fn prior_error(world: &World, colours: &Vec3s, triangle: u32, is_pht: bool) -> f32 {
+pub(super) fn prior_error(
+    world: &World,
+    encoding: Encoding,
+    colours: &Vec3s,
+    triangle: u32,
+    is_pht: bool,
+) -> f32 {
     let corners = world.triangles[triangle as usize];
-    // The square root is close enough to the sRGB curve.
-    let lightness = corners.map(|v| {
+    let [a, b, c] = corners.map(|v| {
         let [r, g, b] = colours.get(v as usize);
-        ((r + g + b) / 3.0).clamp(0.0, 1.0).sqrt() * 255.0
+        let light = ((r + g + b) / 3.0).clamp(0.0, 1.0);
+        255.0
+            * match encoding {
+                // The square root is close enough to the sRGB curve.
+                Encoding::Srgb => light.sqrt(),
+                Encoding::Linear => light,
+            }
     });
-    let [a, b, c] = lightness;
     let contrast = a.max(b).max(c) - a.min(b).min(c);
     let highlight = if is_pht { 4.0 } else { 0.0 };
     contrast * contrast / 1024.0 + highlight + ERROR_FLOOR

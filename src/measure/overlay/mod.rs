@@ -25,7 +25,7 @@ use super::reference::owners;
 use crate::frame::{Engine, Leaf, LeafKind};
 use crate::geometry::Bary;
 use crate::math::PixelPoint;
-use crate::output::Frame;
+use crate::output::{Encoding, Frame};
 use crate::scene::{Scene, View, World};
 use lines::{Lines, Pen};
 use std::fmt;
@@ -101,12 +101,14 @@ const DIMMED: f32 = 0.72;
 /// Image height for which line widths are meant; on larger images lines are wider.
 const NOMINAL_HEIGHT: f32 = 720.0;
 
-/// Draws `layers` over `frame`, which holds the image that `engine` has just rendered of `scene`.
+/// Draws `layers` over `frame`, which holds the image that `engine` has just rendered of `scene`. What comes out is sRGB, as
+/// the colours of the layers are.
 pub fn draw_overlay(frame: &mut Frame, engine: &Engine, scene: &Scene, layers: &[Layer]) {
     let (width, height) = (frame.width(), frame.height());
     let Some(size) = IntSize::from_wh(width, height) else {
         return;
     };
+    frame.convert(Encoding::Srgb);
     let world = engine.world();
     let view = world.view(scene.camera(), width, height);
     let picture = Picture::new(engine, &view);

@@ -100,6 +100,7 @@ impl Camera {
             } else {
                 Eye::Point(self.eye.as_vec3().to_array())
             },
+            encoding: Default::default(),
         }
     }
 }

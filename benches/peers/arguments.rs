@@ -1,0 +1,149 @@
+//! The command line of the comparison.
+
+use std::path::PathBuf;
+
+pub const USAGE: &str = "\
+usage: cargo bench --bench peers -- [OPTIONS]
+
+  --peers DIR         where benches/peers/setup.sh has put the peers; without, only our own frames are timed
+  --meshes N,N        teapots of 56 N x N triangles, N being 4, 8, 32 or 128   [4,32,128]
+  --sizes WxH,WxH     image sizes                                              [512x512,1920x1080,3840x2160]
+  --shading S,S       gouraud or phong, and the number of lights               [gouraud4,phong4,phong16]
+  --threads N         of both programs                                         [2]
+  --rounds N          turns of each cell                                       [5]
+  --simd LEVEL        our SIMD level                                           [the machine's strongest]
+  --csv FILE          writes the rows there, as they are measured
+  --images DIR        writes a view of each cell, as both programs draw it, as PPM
+  --alone             our own frames only
+  --test              one small cell, without peers";
+
+/// How pixels get their colours, and from how many lights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shading {
+    pub is_phong: bool,
+    pub lights: usize,
+}
+
+impl Shading {
+    pub fn mode(self) -> &'static str {
+        if self.is_phong { "phong" } else { "gouraud" }
+    }
+}
+
+/// What was asked for.
+#[derive(Clone, Debug)]
+pub struct Arguments {
+    pub peers: Option<PathBuf>,
+    pub meshes: Vec<u32>,
+    pub sizes: Vec<[u32; 2]>,
+    pub shadings: Vec<Shading>,
+    pub threads: usize,
+    pub rounds: usize,
+    pub simd: Option<specula::simd::SimdLevel>,
+    pub csv: Option<PathBuf>,
+    pub images: Option<PathBuf>,
+    pub is_alone: bool,
+    pub is_test: bool,
+}
+
+impl Arguments {
+    /// Those of this process, or what is wrong with them.
+    pub fn parse() -> Result<Self, String> {
+        let mut parsed = Self {
+            peers: None,
+            meshes: vec![4, 32, 128],
+            sizes: vec![[512, 512], [1920, 1080], [3840, 2160]],
+            shadings: vec![
+                Shading {
+                    is_phong: false,
+                    lights: 4,
+                },
+                Shading {
+                    is_phong: true,
+                    lights: 4,
+                },
+                Shading {
+                    is_phong: true,
+                    lights: 16,
+                },
+            ],
+            threads: 2,
+            rounds: 5,
+            simd: None,
+            csv: None,
+            images: None,
+            is_alone: false,
+            is_test: false,
+        };
+        let mut arguments = std::env::args().skip(1);
+        while let Some(name) = arguments.next() {
+            // What cargo adds.
+            if name == "--bench" {
+                continue;
+            }
+            if name == "--test" {
+                parsed.is_test = true;
+                continue;
+            }
+            if name == "--alone" {
+                parsed.is_alone = true;
+                continue;
+            }
+            if name == "--help" || name == "-h" {
+                return Err(USAGE.to_owned());
+            }
+            let value = arguments
+                .next()
+                .ok_or_else(|| format!("{name} is not an option, or needs a value\n\n{USAGE}"))?;
+            let list = || value.split(',');
+            let bad = |what: &str| format!("{name} {value}: {what}\n\n{USAGE}");
+            match name.as_str() {
+                "--peers" => parsed.peers = Some(value.into()),
+                "--csv" => parsed.csv = Some(value.into()),
+                "--images" => parsed.images = Some(value.into()),
+                "--simd" => parsed.simd = Some(value.parse().map_err(|error: String| bad(&error))?),
+                "--threads" => {
+                    parsed.threads = number(&value).ok_or_else(|| bad("not a number from 1 up"))?
+                }
+                "--rounds" => {
+                    parsed.rounds = number(&value).ok_or_else(|| bad("not a number from 1 up"))?
+                }
+                "--meshes" => {
+                    let meshes = list()
+                        .map(|n| number(n).map(|n| n as u32))
+                        .collect::<Option<_>>();
+                    parsed.meshes = meshes.ok_or_else(|| bad("not numbers"))?;
+                }
+                "--sizes" => {
+                    let sizes = list().map(size).collect::<Option<_>>();
+                    parsed.sizes = sizes.ok_or_else(|| bad("not sizes like 1920x1080"))?;
+                }
+                "--shading" => {
+                    let shadings = list().map(shading).collect::<Option<_>>();
+                    parsed.shadings = shadings
+                        .ok_or_else(|| bad("not like gouraud4 or phong16, lights from 1 to 64"))?;
+                }
+                _ => return Err(format!("{name} is not an option\n\n{USAGE}")),
+            }
+        }
+        Ok(parsed)
+    }
+}
+
+fn number(text: &str) -> Option<usize> {
+    text.parse().ok().filter(|n| *n > 0)
+}
+
+fn size(text: &str) -> Option<[u32; 2]> {
+    let (width, height) = text.split_once('x')?;
+    Some([number(width)? as u32, number(height)? as u32])
+}
+
+fn shading(text: &str) -> Option<Shading> {
+    let (is_phong, lights) = match text.strip_prefix("phong") {
+        Some(lights) => (true, lights),
+        None => (false, text.strip_prefix("gouraud")?),
+    };
+    let lights = number(lights).filter(|lights| *lights <= 64)?;
+    Some(Shading { is_phong, lights })
+}
