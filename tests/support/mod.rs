@@ -2,7 +2,11 @@
 //! the scalar rules of `geometry::screen`.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
+pub(crate) mod exact;
+pub(crate) mod tiling;
+
 use glam::{DMat4, DVec4};
+use rayon::ThreadPool;
 use specula::backend::software::{NO_TRIANGLE, SoftwareBackend};
 use specula::backend::{Backend, Geometry};
 use specula::geometry::screen::{
@@ -12,6 +16,7 @@ use specula::output::Encoding;
 use specula::parallel::Exec;
 use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, View, World};
 use specula::simd::SimdLevel;
+use std::sync::OnceLock;
 
 /// The generator `splitmix64`.
 pub(crate) struct Random(pub(crate) u64);
@@ -139,6 +144,24 @@ pub(crate) fn with_two_threads<T: Send>(f: impl FnOnce(Exec) -> T + Send) -> T {
         ..best()
     };
     pool.install(|| f(exec))
+}
+
+/// Runs `f` as `exec` says, but with two threads, inside a pool that all tests share.
+pub(crate) fn on_two_threads<T: Send>(exec: Exec, f: impl FnOnce(Exec) -> T + Send) -> T {
+    static POOL: OnceLock<ThreadPool> = OnceLock::new();
+    let pool = POOL.get_or_init(|| {
+        let builder = rayon::ThreadPoolBuilder::new().num_threads(2);
+        builder.build().expect("two threads")
+    });
+    pool.install(|| f(Exec { threads: 2, ..exec }))
+}
+
+/// Runs `f` at every level of this machine, on one thread and on two.
+pub(crate) fn on_each_exec(f: impl Fn(Exec) + Sync) {
+    for exec in levels() {
+        f(exec);
+        on_two_threads(exec, &f);
+    }
 }
 
 /// Owner and reversed depth of every pixel.
