@@ -41,6 +41,28 @@ impl Exec {
         }
     }
 
+    /// As [`for_each_chunk`](Self::for_each_chunk), over two lists of the same length at once.
+    pub fn for_each_chunk2<A: Send, B: Send>(
+        &self,
+        a: &mut [A],
+        b: &mut [B],
+        size: usize,
+        f: impl Fn(usize, &mut [A], &mut [B]) + Send + Sync,
+    ) {
+        use rayon::prelude::*;
+        if self.threads > 1 && a.len() > size {
+            a.par_chunks_mut(size)
+                .zip(b.par_chunks_mut(size))
+                .enumerate()
+                .for_each(|(index, (a, b))| f(index, a, b));
+        } else {
+            let chunks = a.chunks_mut(size).zip(b.chunks_mut(size));
+            for (index, (a, b)) in chunks.enumerate() {
+                f(index, a, b);
+            }
+        }
+    }
+
     /// As [`for_each_chunk`](Self::for_each_chunk), over three lists of the same length at once.
     pub fn for_each_chunk3<T: Send>(
         &self,

@@ -4,7 +4,8 @@
 //!
 //! | pass | over | does |
 //! |---|---|---|
-//! | `setup` | `shares` of triangles | transforms vertices (`transform`), culls, clips, works out `planes`, sorts into tiles |
+//! | `transform` | blocks of vertices | pixel space, clipping planes, sub-pixel grid |
+//! | `setup`, `planes` | `shares` of triangles | culls, clips, works out planes, sorts into tiles |
 //! | `raster` | tiles | coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them; counts owners' pixels |
 //! | `visible` | shares | lists the owners |
 //! | `resolve` | tiles | colours |
@@ -171,8 +172,9 @@ impl Backend for SoftwareBackend {
         self.fit(geometry);
         let grid = self.grid;
         self.shares.cut(geometry);
-        self.vertices.clear(exec, geometry.world.positions.len());
-        let vertices = self.vertices.of(exec.level, geometry);
+        self.vertices
+            .transform(exec, geometry, self.shares.used_mut());
+        let vertices = &self.vertices;
         exec.for_each_chunk(self.shares.used_mut(), 1, |_, share| {
             dispatch!(exec.level, simd => setup::set_up(simd, &mut share[0], geometry, grid, vertices));
         });
@@ -218,7 +220,7 @@ impl Backend for SoftwareBackend {
             &painter,
             &self.visible,
             self.grid,
-            self.vertices.of(exec.level, geometry),
+            &self.vertices,
             patches,
         );
         repaint::run(exec, &mut self.tiles, &mut self.jobs, &painter, patches);

@@ -119,11 +119,12 @@ impl<S: Simd> CornerLanes<S> {
     #[inline(always)]
     fn depth(&self, simd: S, planes: &mut Planes, first: usize) {
         let [v0, v1, v2] = &self.points;
-        let plane = |k: usize| {
-            let sum = v0[Z] * self.edges[0][k] + v1[Z] * self.edges[1][k] + v2[Z] * self.edges[2][k];
-            sum / self.determinant
-        };
-        let [dx, dy, constant] = [plane(0), plane(1), plane(2)];
+        let mut plane = [v0[Z]; 3];
+        for (k, plane) in plane.iter_mut().enumerate() {
+            let [e0, e1, e2] = [self.edges[0][k], self.edges[1][k], self.edges[2][k]];
+            *plane = (v0[Z] * e0 + v1[Z] * e1 + v2[Z] * e2) / self.determinant;
+        }
+        let [dx, dy, constant] = plane;
         let base = dx * self.center[0] + dy * self.center[1] + constant;
         let limit = S::f64s::splat(simd, 1e30);
         // False for what is not a number.
@@ -142,11 +143,10 @@ impl<S: Simd> CornerLanes<S> {
     fn interpolators(&self, simd: S, planes: &mut Planes, first: usize) {
         let (zero, one) = (S::f64s::splat(simd, 0.0), S::f64s::splat(simd, 1.0));
         let sign = self.determinant.simd_lt(zero).select(-one, one);
-        let at_anchor = |edge: &[S::f64s; 3]| {
-            (edge[0] * self.center[0] + edge[1] * self.center[1] + edge[2]) * sign
-        };
-        let [e0, e1, e2] = &self.edges;
-        let c = [at_anchor(e0), at_anchor(e1), at_anchor(e2)];
+        let mut c = [zero; 3];
+        for (c, edge) in c.iter_mut().zip(&self.edges) {
+            *c = (edge[0] * self.center[0] + edge[1] * self.center[1] + edge[2]) * sign;
+        }
         let mut largest = zero;
         for (c, edge) in c.iter().zip(&self.edges) {
             for value in [*c, edge[0], edge[1]] {

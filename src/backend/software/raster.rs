@@ -6,27 +6,25 @@
 //! that no pixel of the blocks in question violates is left out; if every pixel violates one, so are the blocks. Any other changes
 //! its sign within 64 x 64 pixels, hence is nowhere larger than `63 * 2^24 < 2^30`: `i32` does not overflow.
 //!
-//! A **small** piece, whose edges are shorter than [`SMALL`] and which touches few blocks, needs no such questions: all numbers are
-//! small, and every block is tried. A piece that touches more than 4 x 4 blocks goes through **squares** of 16 x 16 pixels. Each is rejected, or entered with
-//! those edges only that cross it. A square also knows a depth that none of its pixels is farther than: a piece that nowhere comes
-//! nearer does not enter it. That depth rises when a piece covers the square without a gap, which is what large occluders do.
+//! A **small** piece, whose edges are shorter than [`SMALL`] and which touches at most 2 x 2 blocks, needs no such questions: all
+//! numbers are small, and every block is tried. Others go through **rows of blocks**: for all blocks of a row at once, lanes tell
+//! which of them an edge rules out, which lie inside of all edges, and in which the piece nowhere comes nearer than what is there
+//! already. The latter is known by a depth for each block that none of its pixels is farther than. It rises when a piece covers
+//! the block without a gap, which is what large occluders do.
 //!
-//! Depth is [`DepthPlane::at_pixel`]: products and sums rounded one by one, never fused.
+//! Depth is [`DepthPlane::at_pixel`]: products and sums rounded one by one, never fused. Rounding keeps order, so over the pixels of
+//! a block it is least and largest at corners.
 //! Pieces come in ascending order of slots, hence of ids, so "strictly nearer wins" leaves the smaller id in front at equal depth.
 
 use super::setup::Piece;
 use super::shares::{Share, add_pixels};
 use super::tile::{
-    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, NO_DEPTH, NO_TRIANGLE, TILE_PIXELS, TILE_SIDE, Tile,
+    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, NO_DEPTH, NO_TRIANGLE, TILE_BLOCKS, TILE_PIXELS,
+    TILE_SIDE, Tile,
 };
 use crate::geometry::screen::{DepthPlane, EdgeFunction, SUBPIXEL_BITS};
 use crate::simd::Simd;
 use fearless_simd::{Select, SimdBase, SimdInt, SimdMask};
-
-/// Blocks side by side in a square.
-const SQUARE_BLOCKS: usize = 4;
-/// Squares side by side in a tile.
-const SQUARES_ACROSS: usize = BLOCKS_ACROSS / SQUARE_BLOCKS;
 
 /// Three edges, and the right and the lower border of the image.
 const MOST_EDGES: usize = 5;
@@ -47,7 +45,7 @@ pub(super) fn draw_tile<S: Simd>(simd: S, tile: &mut Tile, index: usize, shares:
     }
     let mut canvas = Canvas {
         depth: [NO_DEPTH; TILE_PIXELS],
-        farthest: [NO_DEPTH; SQUARES_ACROSS * SQUARES_ACROSS],
+        farthest: [NO_DEPTH; TILE_BLOCKS],
         lanes: Lanes::new(simd),
         tile,
     };
@@ -94,6 +92,15 @@ struct BlockRange {
     y0: usize,
     x1: usize,
     y1: usize,
+}
+
+impl BlockRange {
+    /// Those of 64 columns from `first` on that are in the range, one bit each.
+    #[inline(always)]
+    fn columns_from(&self, first: usize) -> u64 {
+        let from_start = u64::MAX << self.x0.saturating_sub(first);
+        from_start & (u64::MAX >> (63 - (self.x1 - first)))
+    }
 }
 
 /// One edge of a piece, in whole pixels.
@@ -225,13 +232,112 @@ fn small_edges(piece: &Piece, [x, y]: [i32; 2]) -> Option<[BlockEdge; 3]> {
     (longest < SMALL).then_some(edges)
 }
 
+/// What drawing the blocks of a piece takes, under `N` edges.
+struct Brush<S: Simd, const N: usize> {
+    edges: [BlockEdge; N],
+    /// Of each edge, the difference of the value at a pixel of a block from that at the block's first.
+    inside_block: [[S::i32s; MOST_PARTS]; N],
+    plane: DepthPlane,
+    slot: S::u32s,
+    /// The tile's first pixel, from the depth's anchor.
+    from_anchor: [i32; 2],
+}
+
+impl<S: Simd, const N: usize> Brush<S, N> {
+    #[inline(always)]
+    fn new(simd: S, lanes: &Lanes<S>, piece: &Piece, edges: [BlockEdge; N], origin: [i32; 2]) -> Self {
+        let mut inside_block = [[S::i32s::splat(simd, 0); MOST_PARTS]; N];
+        for k in 0..N {
+            for part in 0..Lanes::<S>::parts() {
+                inside_block[k][part] =
+                    lanes.column[part] * edges[k].dx + lanes.row[part] * edges[k].dy;
+            }
+        }
+        let plane = piece.depth;
+        Self {
+            edges,
+            inside_block,
+            plane,
+            slot: S::u32s::splat(simd, piece.slot),
+            from_anchor: [origin[0] - plane.anchor[0], origin[1] - plane.anchor[1]],
+        }
+    }
+
+    /// The first column of a block, from the depth's anchor.
+    #[inline(always)]
+    fn column(&self, x: usize) -> i32 {
+        self.from_anchor[0] + (x * BLOCK_SIDE) as i32
+    }
+
+    /// The first row of a block, from the depth's anchor.
+    #[inline(always)]
+    fn row(&self, y: usize) -> i32 {
+        self.from_anchor[1] + (y * BLOCK_SIDE) as i32
+    }
+
+    /// The part of the depth that depends on the row, for the pixels of a block.
+    #[inline(always)]
+    fn row_depths(&self, simd: S, lanes: &Lanes<S>, y: usize) -> [S::f32s; MOST_PARTS] {
+        let mut depths = [S::f32s::splat(simd, 0.0); MOST_PARTS];
+        for part in 0..Lanes::<S>::parts() {
+            let row: S::f32s = (lanes.row[part] + self.row(y)).to_float();
+            depths[part] = row * self.plane.dy + self.plane.base;
+        }
+        depths
+    }
+
+    /// Depths in the columns given from the anchor, given the part that depends on the row.
+    #[inline(always)]
+    fn depths(&self, simd: S, row_depth: S::f32s, column: S::i32s) -> S::f32s {
+        let column: S::f32s = column.to_float();
+        let depth = row_depth + column * self.plane.dx;
+        let (near, far) = (self.plane.max, self.plane.min);
+        depth
+            .max(S::f32s::splat(simd, far))
+            .min(S::f32s::splat(simd, near))
+    }
+
+    /// For a vector of blocks of a row, the first of them in column `x` of the tile: the least and the largest depth of each.
+    #[inline(always)]
+    fn depth_ranges(&self, simd: S, [x, y]: [usize; 2]) -> [S::f32s; 2] {
+        let last = BLOCK_SIDE as i32 - 1;
+        let corners = |slope: f32| if slope < 0.0 { [last, 0] } else { [0, last] };
+        let (columns, rows) = (corners(self.plane.dx), corners(self.plane.dy));
+        let first = S::i32s::from_fn(simd, |i| (i * BLOCK_SIDE) as i32) + self.column(x);
+        let mut ranges = [S::f32s::splat(simd, 0.0); 2];
+        for (range, (column, row)) in ranges.iter_mut().zip(columns.into_iter().zip(rows)) {
+            let row = (self.row(y) + row) as f32;
+            let row_depth = S::f32s::splat(simd, self.plane.base + self.plane.dy * row);
+            *range = self.depths(simd, row_depth, first + column);
+        }
+        ranges
+    }
+
+    /// For a vector of blocks of a row, the first of them `right` pixels to the right of where the edges have the given
+    /// values: which have a pixel that violates no edge as far as the corners tell, and which have no other.
+    #[inline(always)]
+    fn coverage(&self, simd: S, values: &[i32; N], right: i32) -> [S::mask32s; 2] {
+        let last = BLOCK_SIDE as i32 - 1;
+        let across = S::i32s::from_fn(simd, |i| (i * BLOCK_SIDE) as i32) + right;
+        let zero = S::i32s::splat(simd, 0);
+        let (mut some, mut all) = (zero, zero);
+        for k in 0..N {
+            let BlockEdge { dx, dy, .. } = self.edges[k];
+            let value = across * dx + values[k];
+            some |= value + ((last * dx).max(0) + (last * dy).max(0));
+            all |= value + ((last * dx).min(0) + (last * dy).min(0));
+        }
+        [some.simd_ge(zero), all.simd_ge(zero)]
+    }
+}
+
 /// A tile that is being drawn.
 struct Canvas<'a, S: Simd> {
     tile: &'a mut Tile,
     /// Reversed depth of each pixel, or [`NO_DEPTH`].
     depth: [f32; TILE_PIXELS],
-    /// A depth that no pixel of a square is farther than.
-    farthest: [f32; SQUARES_ACROSS * SQUARES_ACROSS],
+    /// A depth that no pixel of a block is farther than.
+    farthest: [f32; TILE_BLOCKS],
     lanes: Lanes<S>,
 }
 
@@ -246,159 +352,131 @@ impl<S: Simd> Canvas<'_, S> {
             x1: block(pixels.x1),
             y1: block(pixels.y1),
         };
-        let blocks = [range.x1 - range.x0, range.y1 - range.y0];
-        if blocks[0] < 2 && blocks[1] < 2 && is_inner(self.tile) {
+        let is_small = range.x1 - range.x0 < 2 && range.y1 - range.y0 < 2;
+        if is_small && is_inner(self.tile) {
             let [left, top] = [range.x0, range.y0].map(|block| (block * BLOCK_SIDE) as i32);
             let first = [self.tile.origin[0] + left, self.tile.origin[1] + top];
             if let Some(edges) = small_edges(piece, first) {
-                self.draw_inside(simd, piece, edges, range);
+                self.draw_each(simd, piece, edges, range);
                 return;
             }
         }
-        let edges = TileEdges::new(piece, self.tile);
-        if blocks[0] < SQUARE_BLOCKS && blocks[1] < SQUARE_BLOCKS {
-            if let Some(edges) = edges.crossing(range) {
-                self.draw_blocks(simd, piece, &edges, range);
-            }
+        let Some(crossing) = TileEdges::new(piece, self.tile).crossing(range) else {
             return;
-        }
-        for y in range.y0 / SQUARE_BLOCKS..=range.y1 / SQUARE_BLOCKS {
-            for x in range.x0 / SQUARE_BLOCKS..=range.x1 / SQUARE_BLOCKS {
-                self.draw_square(simd, piece, &edges, range, [x, y]);
-            }
+        };
+        let all = &crossing.edges;
+        match crossing.count {
+            0 => self.draw_rows(simd, piece, [], range),
+            1 => self.draw_rows(simd, piece, [all[0]], range),
+            2 => self.draw_rows(simd, piece, [all[0], all[1]], range),
+            3 => self.draw_rows(simd, piece, [all[0], all[1], all[2]], range),
+            _ => self.draw_rows(simd, piece, *all, range),
         }
     }
 
-    /// Draws what of a large piece is in a square.
+    /// Draws those pixels of a few blocks that violate none of a small piece's edges.
     #[inline(always)]
-    fn draw_square(
-        &mut self,
-        simd: S,
-        piece: &Piece,
-        edges: &TileEdges,
-        range: BlockRange,
-        [x, y]: [usize; 2],
-    ) {
-        let square = y * SQUARES_ACROSS + x;
-        // What is not strictly nearer loses.
-        if piece.depth.max <= self.farthest[square] {
-            return;
-        }
-        let [first_x, first_y] = [x * SQUARE_BLOCKS, y * SQUARE_BLOCKS];
-        let inner = BlockRange {
-            x0: range.x0.max(first_x),
-            y0: range.y0.max(first_y),
-            x1: range.x1.min(first_x + SQUARE_BLOCKS - 1),
-            y1: range.y1.min(first_y + SQUARE_BLOCKS - 1),
-        };
-        let Some(edges) = edges.crossing(inner) else {
-            return;
-        };
-        self.draw_blocks(simd, piece, &edges, inner);
-        let blocks = (inner.x1 - inner.x0 + 1) * (inner.y1 - inner.y0 + 1);
-        if edges.count == 0 && blocks == SQUARE_BLOCKS * SQUARE_BLOCKS {
-            let nearest = self.farthest_of(&piece.depth, [first_x, first_y]);
-            self.farthest[square] = self.farthest[square].max(nearest);
-        }
-    }
-
-    /// The least depth of a plane over the pixels of a square. Rounding keeps order, so it is that of a corner.
-    #[inline(always)]
-    fn farthest_of(&self, depth: &DepthPlane, blocks: [usize; 2]) -> f32 {
+    fn draw_each(&mut self, simd: S, piece: &Piece, edges: [BlockEdge; 3], range: BlockRange) {
+        let brush = Brush::new(simd, &self.lanes, piece, edges, self.tile.origin);
         let side = BLOCK_SIDE as i32;
-        let [x, y] = [
-            self.tile.origin[0] + blocks[0] as i32 * side,
-            self.tile.origin[1] + blocks[1] as i32 * side,
-        ];
-        let last = SQUARE_BLOCKS as i32 * side - 1;
-        let corners = [[x, y], [x + last, y], [x, y + last], [x + last, y + last]];
-        corners
-            .into_iter()
-            .map(|[x, y]| depth.at_pixel(x, y))
-            .fold(f32::INFINITY, f32::min)
-    }
-
-    #[inline(always)]
-    fn draw_blocks(
-        &mut self,
-        simd: S,
-        piece: &Piece,
-        edges: &BlockEdges,
-        range: BlockRange,
-    ) {
-        let all = &edges.edges;
-        match edges.count {
-            0 => self.draw_inside(simd, piece, [], range),
-            1 => self.draw_inside(simd, piece, [all[0]], range),
-            2 => self.draw_inside(simd, piece, [all[0], all[1]], range),
-            3 => self.draw_inside(simd, piece, [all[0], all[1], all[2]], range),
-            _ => self.draw_inside(simd, piece, *all, range),
+        for y in range.y0..=range.y1 {
+            let row_depths = brush.row_depths(simd, &self.lanes, y);
+            for x in range.x0..=range.x1 {
+                let [right, below] = [(x - range.x0) as i32 * side, (y - range.y0) as i32 * side];
+                let mut corner = [0; 3];
+                for k in 0..3 {
+                    corner[k] = edges[k].start + right * edges[k].dx + below * edges[k].dy;
+                }
+                self.draw_block::<3, false>(simd, &brush, &row_depths, [x, y], &corner);
+            }
         }
     }
 
-    /// Draws the pixels of some blocks that violate none of `N` edges.
+    /// Draws those pixels of some blocks that violate none of `N` edges, row of blocks by row of blocks.
     #[inline(always)]
-    fn draw_inside<const N: usize>(
+    fn draw_rows<const N: usize>(
         &mut self,
         simd: S,
         piece: &Piece,
         edges: [BlockEdge; N],
         range: BlockRange,
     ) {
-        let lanes = self.lanes;
-        let (width, parts) = (S::i32s::LEN, Lanes::<S>::parts());
-        let side = BLOCK_SIDE as i32;
-        let zero = S::i32s::splat(simd, 0);
-        // Values at the pixels of the first block of a row of blocks.
-        let mut row_values = [[zero; MOST_PARTS]; N];
-        for k in 0..N {
-            for part in 0..parts {
-                row_values[k][part] =
-                    lanes.column[part] * edges[k].dx + lanes.row[part] * edges[k].dy + edges[k].start;
+        let (width, side) = (S::i32s::LEN, BLOCK_SIDE as i32);
+        let brush = Brush::new(simd, &self.lanes, piece, edges, self.tile.origin);
+        for y in range.y0..=range.y1 {
+            let row_depths = brush.row_depths(simd, &self.lanes, y);
+            let below = (y - range.y0) as i32 * side;
+            let mut values = [0; N];
+            for k in 0..N {
+                values[k] = edges[k].start + below * edges[k].dy;
+            }
+            for first in ((range.x0 & !(width - 1))..=range.x1).step_by(width) {
+                let right = (first as i32 - range.x0 as i32) * side;
+                let [some, all] = brush.coverage(simd, &values, right);
+                let [least, most] = brush.depth_ranges(simd, [first, y]);
+                let at = y * BLOCKS_ACROSS + first;
+                let farthest = S::f32s::from_slice(simd, &self.farthest[at..at + width]);
+                // What is nowhere strictly nearer loses.
+                let mut left =
+                    (some & most.simd_gt(farthest)).to_bitmask() & range.columns_from(first);
+                let full = all.to_bitmask() & left;
+                if full != 0 {
+                    let filled = S::mask32s::from_bitmask(simd, full);
+                    filled
+                        .select(least.max(farthest), farthest)
+                        .store_slice(&mut self.farthest[at..at + width]);
+                }
+                while left != 0 {
+                    let bit = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    let mut corner = values;
+                    for k in 0..N {
+                        corner[k] += (right + bit as i32 * side).wrapping_mul(edges[k].dx);
+                    }
+                    let place = [first + bit, y];
+                    if full >> bit & 1 == 1 {
+                        self.draw_block::<N, true>(simd, &brush, &row_depths, place, &corner);
+                    } else {
+                        self.draw_block::<N, false>(simd, &brush, &row_depths, place, &corner);
+                    }
+                }
             }
         }
-        let plane = &piece.depth;
-        let slope = S::f32s::splat(simd, plane.dx);
-        let (near, far) = (
-            S::f32s::splat(simd, plane.max),
-            S::f32s::splat(simd, plane.min),
-        );
-        let slot = S::u32s::splat(simd, piece.slot);
-        let left = self.tile.origin[0] + range.x0 as i32 * side - plane.anchor[0];
-        let top = self.tile.origin[1] + range.y0 as i32 * side - plane.anchor[1];
-        for y in range.y0..=range.y1 {
-            let above = top + (y - range.y0) as i32 * side;
-            for part in 0..parts {
-                let row: S::f32s = (lanes.row[part] + above).to_float();
-                let row_depth = row * plane.dy + plane.base;
-                let mut column: S::f32s = (lanes.column[part] + left).to_float();
-                let mut values = [zero; N];
+    }
+
+    /// Draws a block's pixels: all of them, or those that violate no edge, whose values at the first pixel are given.
+    #[inline(always)]
+    fn draw_block<const N: usize, const IS_FULL: bool>(
+        &mut self,
+        simd: S,
+        brush: &Brush<S, N>,
+        row_depths: &[S::f32s; MOST_PARTS],
+        [x, y]: [usize; 2],
+        corner: &[i32; N],
+    ) {
+        let width = S::i32s::LEN;
+        let block = y * BLOCKS_ACROSS + x;
+        let zero = S::i32s::splat(simd, 0);
+        for part in 0..Lanes::<S>::parts() {
+            let column = self.lanes.column[part] + brush.column(x);
+            let depth = brush.depths(simd, row_depths[part], column);
+            let at = block * BLOCK_PIXELS + part * width;
+            let stored = S::f32s::from_slice(simd, &self.depth[at..at + width]);
+            let mut wins = depth.simd_gt(stored);
+            if !IS_FULL {
+                let mut signs = zero;
                 for k in 0..N {
-                    values[k] = row_values[k][part];
-                    row_values[k][part] += edges[k].dy * side;
+                    signs |= brush.inside_block[k][part] + corner[k];
                 }
-                for x in range.x0..=range.x1 {
-                    let mut signs = zero;
-                    for k in 0..N {
-                        signs |= values[k];
-                        values[k] += edges[k].dx * side;
-                    }
-                    let inside = signs.simd_ge(zero);
-                    let depth = (row_depth + slope * column).max(far).min(near);
-                    column += side as f32;
-                    let block = y * BLOCKS_ACROSS + x;
-                    let at = block * BLOCK_PIXELS + part * width;
-                    let stored = S::f32s::from_slice(simd, &self.depth[at..at + width]);
-                    let wins = inside & depth.simd_gt(stored);
-                    if wins.any_true() {
-                        let owner = S::u32s::from_slice(simd, &self.tile.slot[at..at + width]);
-                        wins.select(depth, stored)
-                            .store_slice(&mut self.depth[at..at + width]);
-                        wins.select(slot, owner)
-                            .store_slice(&mut self.tile.slot[at..at + width]);
-                        self.tile.owned.insert(block);
-                    }
-                }
+                wins &= signs.simd_ge(zero);
+            }
+            if wins.any_true() {
+                let owner = S::u32s::from_slice(simd, &self.tile.slot[at..at + width]);
+                wins.select(depth, stored)
+                    .store_slice(&mut self.depth[at..at + width]);
+                wins.select(brush.slot, owner)
+                    .store_slice(&mut self.tile.slot[at..at + width]);
+                self.tile.owned.insert(block);
             }
         }
     }

@@ -17,7 +17,7 @@ use super::setup::corners;
 use super::tile::{
     BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, Bounds, Grid, TILE_SIDE, Tile, TileBox, block_corner,
 };
-use super::transform::VerticesOf;
+use super::transform::Vertices;
 use super::visible::Visible;
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
@@ -69,7 +69,7 @@ pub(super) fn plan(
     painter: &Painter<'_>,
     visible: &Visible,
     grid: Grid,
-    vertices: VerticesOf<'_>,
+    vertices: &Vertices,
     patches: &[Patch],
 ) {
     jobs.clear();

@@ -16,13 +16,14 @@ use super::fit;
 use super::planes::{Corners, TRIANGLES};
 use super::shares::Share;
 use super::tile::{Bounds, Grid};
-use super::transform::{SnappedVertex, VerticesOf};
+use super::transform::{SnappedVertex, Vertices};
 use crate::backend::Geometry;
 use crate::geometry::screen::{
     DepthPlane, Interpolator, PixelBox, SUBPIXEL_BITS, TrianglePlanes, clip, doubled_area, snap,
 };
 use crate::math::PixelPoint;
 use crate::simd::Simd;
+use fearless_simd::prelude::*;
 
 /// Triangles looked at together.
 const BATCH: usize = 16;
@@ -75,7 +76,7 @@ impl Drawn {
 
 /// The corners of a triangle in homogeneous pixel space.
 #[inline(always)]
-pub(super) fn corners(vertices: VerticesOf<'_>, triangle: [u32; 3]) -> [PixelPoint; 3] {
+pub(super) fn corners(vertices: &Vertices, triangle: [u32; 3]) -> [PixelPoint; 3] {
     [
         vertices.point(triangle[0]),
         vertices.point(triangle[1]),
@@ -90,7 +91,7 @@ pub(super) fn set_up<S: Simd>(
     share: &mut Share,
     geometry: Geometry<'_>,
     grid: Grid,
-    vertices: VerticesOf<'_>,
+    vertices: &Vertices,
 ) {
     let setup = Setup {
         geometry,
@@ -110,30 +111,43 @@ pub(super) fn set_up<S: Simd>(
     bin(share, grid);
 }
 
-/// The corners of a batch of triangles on the sub-pixel grid, and what they say.
+/// The corners of a batch of triangles on the sub-pixel grid.
 struct Batch {
     /// By corner.
     x: [[i32; BATCH]; 3],
     /// By corner.
     y: [[i32; BATCH]; 3],
     /// Planes that some corner is outside of.
-    some_outside: [u32; BATCH],
+    some_outside: [i32; BATCH],
     /// Planes that all corners are outside of.
-    all_outside: [u32; BATCH],
+    all_outside: [i32; BATCH],
 }
 
-/// What becomes of a triangle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Verdict {
-    OffScreen,
-    BackFacing,
-    Clip,
-    Draw,
+/// What becomes of the triangles of a batch: one bit each. Those in none of the sets are off the screen.
+#[derive(Clone, Copy, Default)]
+struct Verdicts {
+    back_facing: u64,
+    clip: u64,
+    draw: u64,
+}
+
+/// First and last pixels along an axis.
+#[derive(Clone, Copy)]
+struct PixelRanges {
+    first: [i32; BATCH],
+    last: [i32; BATCH],
+}
+
+impl PixelRanges {
+    const NONE: Self = Self {
+        first: [0; BATCH],
+        last: [0; BATCH],
+    };
 }
 
 impl Batch {
     #[inline(always)]
-    fn gather(vertices: VerticesOf<'_>, triangles: &[[u32; 3]]) -> Self {
+    fn gather(snapped: &[SnappedVertex], triangles: &[[u32; 3]]) -> Self {
         let mut batch = Self {
             x: [[0; BATCH]; 3],
             y: [[0; BATCH]; 3],
@@ -141,14 +155,16 @@ impl Batch {
             all_outside: [0; BATCH],
         };
         for (i, triangle) in triangles.iter().enumerate().take(BATCH) {
-            let mut codes = [0; 3];
-            for corner in 0..3 {
-                let SnappedVertex { position, outcode } = vertices.snapped(triangle[corner]);
-                [batch.x[corner][i], batch.y[corner][i]] = position;
-                codes[corner] = outcode;
+            let [a, b, c] = [
+                snapped[triangle[0] as usize],
+                snapped[triangle[1] as usize],
+                snapped[triangle[2] as usize],
+            ];
+            for (corner, vertex) in [a, b, c].into_iter().enumerate() {
+                [batch.x[corner][i], batch.y[corner][i]] = vertex.position;
             }
-            batch.some_outside[i] = codes[0] | codes[1] | codes[2];
-            batch.all_outside[i] = codes[0] & codes[1] & codes[2];
+            batch.some_outside[i] = a.outcode | b.outcode | c.outcode;
+            batch.all_outside[i] = a.outcode & b.outcode & c.outcode;
         }
         batch
     }
@@ -163,42 +179,76 @@ impl Batch {
         ]
     }
 
-    /// Positive where a triangle turns its front to the viewer, negative where its back, zero where it has no area:
-    /// twice the area in squared sub-pixels, exactly, since the differences of coordinates are below `2^23`. Valid where all corners are inside.
+    /// What becomes of a vector's worth of triangles from `at` on, and the boxes of those that are drawn.
     #[inline(always)]
-    fn doubled_areas(&self) -> [f64; BATCH] {
-        let mut out = [0.0; BATCH];
-        for i in 0..BATCH {
-            let [ux, uy] =
-                [self.x[1][i] - self.x[0][i], self.y[1][i] - self.y[0][i]].map(f64::from);
-            let [vx, vy] =
-                [self.x[2][i] - self.x[0][i], self.y[2][i] - self.y[0][i]].map(f64::from);
-            out[i] = uy * vx - ux * vy;
+    fn judge<S: Simd>(&self, simd: S, grid: Grid, at: usize, boxes: &mut [PixelRanges; 2]) -> Verdicts {
+        let end = at + S::i32s::LEN;
+        let load = |from: &[i32; BATCH]| S::i32s::from_slice(simd, &from[at..end]);
+        let zero = S::i32s::splat(simd, 0);
+        let inside = load(&self.some_outside).simd_eq(zero);
+        let clip = !inside & load(&self.all_outside).simd_eq(zero);
+
+        let x = [load(&self.x[0]), load(&self.x[1]), load(&self.x[2])];
+        let y = [load(&self.y[0]), load(&self.y[1]), load(&self.y[2])];
+        let [front, back] = self.facing(simd, at, &x, &y);
+        let [x0, x1] = pixel_range(simd, x, grid.width);
+        let [y0, y1] = pixel_range(simd, y, grid.height);
+        let has_pixels = x0.simd_le(x1) & y0.simd_le(y1);
+        for (ranges, [first, last]) in boxes.iter_mut().zip([[x0, x1], [y0, y1]]) {
+            first.store_slice(&mut ranges.first[at..end]);
+            last.store_slice(&mut ranges.last[at..end]);
         }
-        out
+        Verdicts {
+            back_facing: (inside & back).to_bitmask() << at,
+            clip: clip.to_bitmask() << at,
+            draw: (inside & front & has_pixels).to_bitmask() << at,
+        }
     }
 
-    /// First and last pixel along an axis of `size` pixels whose centres lie in the triangles' boxes, as
-    /// [`PixelBox::of_snapped`] has them.
+    /// Which triangles turn their front to the viewer, and which their back; valid where all corners are inside. Twice the area
+    /// in squared sub-pixels is exact in `i32` where the box is below `2^15` along both axes.
     #[inline(always)]
-    fn pixel_ranges(v: &[[i32; BATCH]; 3], size: u32) -> [[i32; BATCH]; 2] {
-        let half = 1 << (SUBPIXEL_BITS - 1);
-        let (mut first, mut last) = ([0; BATCH], [0; BATCH]);
-        for i in 0..BATCH {
-            let min = v[0][i].min(v[1][i]).min(v[2][i]);
-            let max = v[0][i].max(v[1][i]).max(v[2][i]);
-            first[i] = ((min + (half - 1)) >> SUBPIXEL_BITS).max(0);
-            last[i] = ((max - half) >> SUBPIXEL_BITS).min(size as i32 - 1);
+    fn facing<S: Simd>(
+        &self,
+        simd: S,
+        at: usize,
+        x: &[S::i32s; 3],
+        y: &[S::i32s; 3],
+    ) -> [S::mask32s; 2] {
+        let ([ux, vx], [uy, vy]) = ([x[1] - x[0], x[2] - x[0]], [y[1] - y[0], y[2] - y[0]]);
+        let zero = S::i32s::splat(simd, 0);
+        let mut area = uy * vx - ux * vy;
+        // A number is below 2^15 in magnitude where its upper 17 bits are all alike.
+        let excess = |v: S::i32s| (v ^ (v >> 31)) >> 15;
+        let large = (excess(ux) | excess(uy) | excess(vx) | excess(vy)).simd_ne(zero);
+        if large.any_true() {
+            // The sign is all that matters.
+            for (lane, area) in area.as_mut_slice().iter_mut().enumerate() {
+                *area = doubled_area(self.corners(at + lane)).signum() as i32;
+            }
         }
-        [first, last]
+        [area.simd_gt(zero), area.simd_lt(zero)]
     }
+}
+
+/// First and last pixel along an axis of `size` pixels whose centres lie in the triangles' boxes, as
+/// [`PixelBox::of_snapped`] has them.
+#[inline(always)]
+fn pixel_range<S: Simd>(simd: S, v: [S::i32s; 3], size: u32) -> [S::i32s; 2] {
+    let half = 1 << (SUBPIXEL_BITS - 1);
+    let min = v[0].min(v[1]).min(v[2]);
+    let max = v[0].max(v[1]).max(v[2]);
+    [
+        ((min + (half - 1)) >> SUBPIXEL_BITS).max(S::i32s::splat(simd, 0)),
+        ((max - half) >> SUBPIXEL_BITS).min(S::i32s::splat(simd, size as i32 - 1)),
+    ]
 }
 
 /// What set-up reads.
 struct Setup<'a> {
     geometry: Geometry<'a>,
     grid: Grid,
-    vertices: VerticesOf<'a>,
+    vertices: &'a Vertices,
 }
 
 impl Setup<'_> {
@@ -212,59 +262,43 @@ impl Setup<'_> {
         first: u32,
         triangles: &[[u32; 3]],
     ) {
-        let batch = Batch::gather(self.vertices, triangles);
-        let areas = batch.doubled_areas();
-        let [x0, x1] = Batch::pixel_ranges(&batch.x, self.grid.width);
-        let [y0, y1] = Batch::pixel_ranges(&batch.y, self.grid.height);
-        let mut verdicts = [Verdict::OffScreen; BATCH];
-        for i in 0..BATCH {
-            let has_pixels = (x0[i] <= x1[i]) & (y0[i] <= y1[i]) & (areas[i] != 0.0);
-            let inside = if areas[i] < 0.0 {
-                Verdict::BackFacing
-            } else if has_pixels {
-                Verdict::Draw
-            } else {
-                Verdict::OffScreen
-            };
-            let outside = if batch.all_outside[i] == 0 {
-                Verdict::Clip
-            } else {
-                Verdict::OffScreen
-            };
-            verdicts[i] = if batch.some_outside[i] == 0 {
-                inside
-            } else {
-                outside
-            };
+        let batch = Batch::gather(self.vertices.snapped(), triangles);
+        let mut boxes = [PixelRanges::NONE; 2];
+        let mut verdicts = Verdicts::default();
+        for at in (0..BATCH).step_by(S::i32s::LEN) {
+            let some = batch.judge(simd, self.grid, at, &mut boxes);
+            verdicts.back_facing |= some.back_facing;
+            verdicts.clip |= some.clip;
+            verdicts.draw |= some.draw;
         }
-        share.counts.submitted += triangles.len() as u64;
-        for (i, &triangle) in triangles.iter().enumerate().take(BATCH) {
-            match verdicts[i] {
-                Verdict::OffScreen => share.counts.off_screen += 1,
-                Verdict::BackFacing => share.counts.back_facing += 1,
-                Verdict::Clip => {
-                    // In order.
-                    self.flush(simd, share, pending);
-                    self.clip(share, first + i as u32, triangle);
-                }
-                Verdict::Draw => {
-                    let bounds = PixelBox {
-                        x0: x0[i],
-                        y0: y0[i],
-                        x1: x1[i],
-                        y1: y1[i],
-                    };
-                    pending.push(
-                        self.vertices,
-                        first + i as u32,
-                        triangle,
-                        batch.corners(i),
-                        bounds,
-                    );
-                    if pending.len == TRIANGLES {
-                        self.flush(simd, share, pending);
-                    }
-                }
+        // The last batch of a range may not be full.
+        let submitted = triangles.len().min(BATCH);
+        let meant = (1 << submitted) - 1;
+        let back_facing = (verdicts.back_facing & meant).count_ones();
+        let mut left = (verdicts.clip | verdicts.draw) & meant;
+        let counts = &mut share.counts;
+        counts.submitted += submitted as u64;
+        counts.back_facing += u64::from(back_facing);
+        counts.off_screen += (submitted as u32 - back_facing - left.count_ones()) as u64;
+        while left != 0 {
+            let i = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let (id, triangle) = (first + i as u32, triangles[i]);
+            if verdicts.clip >> i & 1 == 1 {
+                // In order.
+                self.flush(simd, share, pending);
+                self.clip(share, id, triangle);
+                continue;
+            }
+            let bounds = PixelBox {
+                x0: boxes[0].first[i],
+                y0: boxes[1].first[i],
+                x1: boxes[0].last[i],
+                y1: boxes[1].last[i],
+            };
+            pending.push(self.vertices, id, triangle, batch.corners(i), bounds);
+            if pending.len == TRIANGLES {
+                self.flush(simd, share, pending);
             }
         }
     }
@@ -376,7 +410,7 @@ impl Pending {
     #[inline(always)]
     fn push(
         &mut self,
-        all: VerticesOf<'_>,
+        all: &Vertices,
         id: u32,
         vertices: [u32; 3],
         snapped: [[i32; 2]; 3],

@@ -29,6 +29,9 @@ pub(super) const BLOCK_PIXELS: usize = BLOCK_SIDE * BLOCK_SIDE;
 /// Blocks side by side in a tile.
 pub(super) const BLOCKS_ACROSS: usize = TILE_SIDE / BLOCK_SIDE;
 
+/// Blocks of a tile.
+pub(super) const TILE_BLOCKS: usize = BLOCKS_ACROSS * BLOCKS_ACROSS;
+
 /// The id of a pixel that no triangle covers.
 pub const NO_TRIANGLE: u32 = u32::MAX;
 

@@ -1,153 +1,251 @@
 //! Vertices in homogeneous pixel space, each one transformed once.
 //!
-//! Vertices are transformed in blocks of 16 consecutive ones, when set-up asks for the first of them; the meshes' vertex order makes
-//! such blocks either wholly used or wholly unused for the most part. So there is no list of vertices to be made first, nothing is
-//! transformed that no submitted triangle uses, and what has just been transformed is still in the cache of the thread that needs it.
-//! A thread that asks for a block which another one is transforming waits for that.
-//!
-//! Within a block the same scalar rules
-//! ([`transform_point`](crate::math::transform_point), [`outcode`], [`snap`]) run over arrays of fixed length, which the compiler
-//! turns into vectors of the dispatched level; each operation is rounded by itself, so the bits are the same at all levels.
+//! Only blocks of 16 consecutive vertices that some submitted triangle uses are transformed; the meshes' vertex order makes
+//! such blocks either wholly used or wholly unused for the most part. Triangles mark the blocks first, then blocks are
+//! transformed in lanes of `f64`. Each operation is rounded by itself, so the bits are the same at all levels, and those of the scalar
+//! rules ([`transform_point`](crate::math::transform_point), [`outcode`], [`snap`](crate::geometry::screen::snap)).
 //!
 //! What comes out is stored vertex by vertex, since set-up picks vertices one at a time: what every submitted triangle needs of
 //! its corners apart from what only those need that are drawn.
 
+use super::shares::Share;
 use crate::backend::Geometry;
-use crate::geometry::screen::{outcode, snap};
+use crate::geometry::screen::{GUARD_BAND_PX, SUBPIXEL_BITS, outcode};
 use crate::math::PixelPoint;
 use crate::parallel::Exec;
-use crate::simd::{Level, Simd, dispatch};
-use std::sync::OnceLock;
+use crate::scene::View;
+use crate::simd::{Simd, dispatch};
+use fearless_simd::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Vertices of a block.
 const BLOCK: usize = 16;
-/// Blocks that one task takes back to the start.
-const BLOCKS_PER_TASK: usize = 1024;
+/// Blocks that one task transforms: about 10 microseconds.
+const BLOCKS_PER_TASK: usize = 128;
 
 /// A vertex on the sub-pixel grid.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(16))]
 pub(super) struct SnappedVertex {
     /// Where; valid if the outcode is zero.
     pub position: [i32; 2],
     /// Clipping planes that the vertex is outside of.
-    pub outcode: u32,
+    pub outcode: i32,
 }
 
-/// [`BLOCK`] consecutive vertices.
-#[derive(Clone, Debug)]
-struct VertexBlock {
-    snapped: [SnappedVertex; BLOCK],
-    /// Homogeneous pixel space.
-    point: [PixelPoint; BLOCK],
-}
-
-impl VertexBlock {
-    const EMPTY: Self = Self {
-        snapped: [SnappedVertex {
-            position: [0; 2],
-            outcode: 0,
-        }; BLOCK],
-        point: [[0.0; 4]; BLOCK],
-    };
-}
-
-/// All vertices of a world.
+/// All vertices of a world; those used by submitted triangles are valid.
 #[derive(Debug, Default)]
 pub(super) struct Vertices {
-    blocks: Vec<OnceLock<VertexBlock>>,
+    snapped: Vec<[SnappedVertex; BLOCK]>,
+    /// Homogeneous pixel space.
+    points: Vec<[PixelPoint; BLOCK]>,
+    /// Blocks to be transformed; all false between passes. Several threads may set the same flag.
+    wanted: Vec<AtomicBool>,
 }
 
 impl Vertices {
-    /// Forgets where vertices are, for a world of `count` vertices.
-    pub(super) fn clear(&mut self, exec: Exec, count: usize) {
-        self.blocks.resize_with(count.div_ceil(BLOCK), OnceLock::new);
-        exec.for_each_chunk(&mut self.blocks, BLOCKS_PER_TASK, |_, blocks| {
-            blocks.fill_with(OnceLock::new);
+    /// Transforms the vertices of all triangles in `shares`.
+    pub(super) fn transform(&mut self, exec: Exec, geometry: Geometry<'_>, shares: &mut [Share]) {
+        let count = geometry.world.positions.len().div_ceil(BLOCK);
+        self.snapped.resize(count, [SnappedVertex::default(); BLOCK]);
+        self.points.resize(count, [[0.0; 4]; BLOCK]);
+        self.wanted.resize_with(count, AtomicBool::default);
+        let wanted = &self.wanted;
+        exec.for_each_chunk(shares, 1, |_, share| {
+            for range in share[0].ranges(geometry) {
+                for &vertex in geometry.world.triangles[range].as_flattened() {
+                    let flag = &wanted[vertex as usize / BLOCK];
+                    // Looking first keeps the cache line shared between threads.
+                    if !flag.load(Ordering::Relaxed) {
+                        flag.store(true, Ordering::Relaxed);
+                    }
+                }
+            }
+        });
+        let (snapped, points) = (&mut self.snapped[..], &mut self.points[..]);
+        exec.for_each_chunk2(snapped, points, BLOCKS_PER_TASK, |task, snapped, points| {
+            dispatch!(exec.level, simd => {
+                let first = task * BLOCKS_PER_TASK;
+                for (index, (snapped, points)) in snapped.iter_mut().zip(points).enumerate() {
+                    let flag = &wanted[first + index];
+                    if flag.load(Ordering::Relaxed) {
+                        flag.store(false, Ordering::Relaxed);
+                        transform_block(simd, geometry, (first + index) * BLOCK, snapped, points);
+                    }
+                }
+            });
         });
     }
 
-    /// The vertices of an image.
-    pub(super) fn of<'a>(&'a self, level: Level, geometry: Geometry<'a>) -> VerticesOf<'a> {
-        VerticesOf {
-            blocks: &self.blocks,
-            level,
-            geometry,
-        }
-    }
-}
-
-/// The vertices of an image.
-#[derive(Clone, Copy)]
-pub(super) struct VerticesOf<'a> {
-    blocks: &'a [OnceLock<VertexBlock>],
-    level: Level,
-    geometry: Geometry<'a>,
-}
-
-impl VerticesOf<'_> {
     /// A vertex in homogeneous pixel space.
     #[inline(always)]
     pub(super) fn point(&self, vertex: u32) -> PixelPoint {
-        self.block(vertex).point[vertex as usize % BLOCK]
+        self.points.as_flattened()[vertex as usize]
     }
 
-    /// A vertex on the sub-pixel grid.
+    /// All vertices on the sub-pixel grid.
     #[inline(always)]
-    pub(super) fn snapped(&self, vertex: u32) -> SnappedVertex {
-        self.block(vertex).snapped[vertex as usize % BLOCK]
-    }
-
-    #[inline(always)]
-    fn block(&self, vertex: u32) -> &VertexBlock {
-        let index = vertex as usize / BLOCK;
-        let block = &self.blocks[index];
-        match block.get() {
-            Some(block) => block,
-            None => self.transform(block, index),
-        }
-    }
-
-    #[inline(never)]
-    fn transform<'b>(&self, block: &'b OnceLock<VertexBlock>, index: usize) -> &'b VertexBlock {
-        block.get_or_init(|| {
-            dispatch!(self.level, simd => transform_block(simd, self.geometry, index * BLOCK))
-        })
+    pub(super) fn snapped(&self) -> &[SnappedVertex] {
+        self.snapped.as_flattened()
     }
 }
 
+/// Transforms a block whose first vertex is `first`. Behind the world's last vertex it is repeated.
 #[inline(always)]
 fn transform_block<S: Simd>(
-    _simd: S,
+    simd: S,
     geometry: Geometry<'_>,
     first: usize,
-) -> VertexBlock {
+    snapped: &mut [SnappedVertex; BLOCK],
+    points: &mut [PixelPoint; BLOCK],
+) {
     let positions = &geometry.world.positions;
     let used = BLOCK.min(positions.len() - first);
-    let (mut x, mut y, mut z) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-    x[..used].copy_from_slice(&positions.x[first..first + used]);
-    y[..used].copy_from_slice(&positions.y[first..first + used]);
-    z[..used].copy_from_slice(&positions.z[first..first + used]);
+    let widen = |from: &[f32]| {
+        let mut out = [0.0; BLOCK];
+        for (out, &value) in out.iter_mut().zip(&from[first..first + used]) {
+            *out = f64::from(value);
+        }
+        out
+    };
+    let position = [widen(&positions.x), widen(&positions.y), widen(&positions.z)];
     let mut point = [[0.0; BLOCK]; 4];
+    let mut grid = [[0.0; BLOCK]; 2];
+    let mut inside = true;
+    for at in (0..BLOCK).step_by(S::f64s::LEN) {
+        inside &= transform_lanes(simd, geometry.view, at, &position, &mut point, &mut grid);
+    }
     for i in 0..BLOCK {
-        let p = geometry.view.project([x[i], y[i], z[i]]);
-        for (component, value) in point.iter_mut().zip(p) {
-            component[i] = value;
+        points[i] = [point[0][i], point[1][i], point[2][i], point[3][i]];
+        snapped[i] = SnappedVertex {
+            // The integer is in the low bits of the mantissa.
+            position: [grid[0][i].to_bits() as i32, grid[1][i].to_bits() as i32],
+            outcode: 0,
+        };
+    }
+    if !inside {
+        for (snapped, point) in snapped.iter_mut().zip(points) {
+            snapped.outcode = i32::from(outcode(*point));
         }
     }
-    let mut codes = [0; BLOCK];
-    let mut snapped = [[0; BLOCK]; 2];
-    for i in 0..BLOCK {
-        let p = [point[0][i], point[1][i], point[2][i], point[3][i]];
-        codes[i] = outcode(p);
-        [snapped[0][i], snapped[1][i]] = snap(p);
+}
+
+/// Added to a number of less than `2^51`, leaves its nearest integer, ties to even, in the low bits of the sum's mantissa.
+const TO_INTEGER: f64 = 6_755_399_441_055_744.0;
+
+/// Transforms a vector's worth of a block from place `at` on. What is written to `grid` is snapped and has [`TO_INTEGER`] added.
+/// Says whether all of them are inside of all clipping planes.
+#[inline(always)]
+fn transform_lanes<S: Simd>(
+    simd: S,
+    view: &View,
+    at: usize,
+    position: &[[f64; BLOCK]; 3],
+    point: &mut [[f64; BLOCK]; 4],
+    grid: &mut [[f64; BLOCK]; 2],
+) -> bool {
+    let end = at + S::f64s::LEN;
+    let [px, py, pz] = [
+        S::f64s::from_slice(simd, &position[0][at..end]),
+        S::f64s::from_slice(simd, &position[1][at..end]),
+        S::f64s::from_slice(simd, &position[2][at..end]),
+    ];
+    let m = &view.pixel_from_world;
+    let mut rows = [px; 4];
+    for (i, row) in rows.iter_mut().enumerate() {
+        *row = px * m.x_axis[i] + py * m.y_axis[i] + pz * m.z_axis[i] + m.w_axis[i];
     }
-    let mut block = VertexBlock::EMPTY;
-    for i in 0..BLOCK {
-        block.snapped[i] = SnappedVertex {
-            position: [snapped[0][i], snapped[1][i]],
-            outcode: u32::from(codes[i]),
-        };
-        block.point[i] = [point[0][i], point[1][i], point[2][i], point[3][i]];
+    let [x, y, z, w] = rows;
+    x.store_slice(&mut point[0][at..end]);
+    y.store_slice(&mut point[1][at..end]);
+    z.store_slice(&mut point[2][at..end]);
+    w.store_slice(&mut point[3][at..end]);
+
+    let zero = S::f64s::splat(simd, 0.0);
+    let guard = w * GUARD_BAND_PX;
+    let inside = w.simd_gt(zero)
+        & (w - z).simd_ge(zero)
+        & z.simd_ge(zero)
+        & (guard + x).simd_ge(zero)
+        & (guard - x).simd_ge(zero)
+        & (guard + y).simd_ge(zero)
+        & (guard - y).simd_ge(zero);
+
+    let subpixel = f64::from(1 << SUBPIXEL_BITS);
+    let limit = S::f64s::splat(simd, GUARD_BAND_PX * subpixel);
+    for (v, grid) in [x, y].into_iter().zip(grid) {
+        // Limits are integers, so rounding may come last.
+        let snapped = (v / w * subpixel).max(-limit).min(limit) + TO_INTEGER;
+        snapped.store_slice(&mut grid[at..end]);
     }
-    block
+    inside.all_true()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::screen::snap;
+    use crate::scene::{Eye, World};
+    use crate::simd::SimdLevel;
+    use glam::{DMat4, DVec4};
+    use proptest::prelude::*;
+    use std::ops::Range;
+
+    fn coordinate() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            8 => -2.0..2.0_f32,
+            1 => prop_oneof![Just(f32::NAN), Just(f32::INFINITY), Just(1e30_f32), Just(0.0)],
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn lanes_have_the_bits_of_the_scalar_rules(
+            corners in prop::collection::vec(prop::array::uniform3(coordinate()), 1..70),
+            near in 0.01..1.0_f64,
+        ) {
+            let mut world = World::default();
+            for &p in &corners {
+                world.positions.push(p);
+            }
+            let count = corners.len() as u32;
+            world.triangles = (0..count).map(|v| [v, v, 0]).collect();
+            let view = View {
+                width: 640,
+                height: 480,
+                pixel_from_world: DMat4::from_cols(
+                    DVec4::new(700.0, 1.0, 0.1, 0.0),
+                    DVec4::new(0.0, 650.0, 0.0, 0.3),
+                    DVec4::new(320.0, 240.0, -near, 1.0),
+                    DVec4::new(0.0, 0.0, near * 3.0, 0.5),
+                ),
+                eye: Eye::Point([0.0; 3]),
+                encoding: Default::default(),
+            };
+            let visible: [Range<u32>; 1] = std::array::from_fn(|_| 0..count);
+            let geometry = Geometry { world: &world, view: &view, visible: &visible };
+            for level in SimdLevel::available().filter_map(SimdLevel::token) {
+                let mut shares = super::super::shares::Shares::default();
+                shares.cut(geometry);
+                let mut vertices = Vertices::default();
+                vertices.transform(Exec { level, threads: 1 }, geometry, shares.used_mut());
+                for (v, &p) in corners.iter().enumerate() {
+                    let want = view.project(p);
+                    let point = vertices.point(v as u32);
+                    for (got, want) in point.into_iter().zip(want) {
+                        // What is no number may be so in different ways.
+                        let are_nan = got.is_nan() && want.is_nan();
+                        prop_assert!(are_nan || got.to_bits() == want.to_bits(), "{got} {want}");
+                    }
+                    let got = vertices.snapped()[v];
+                    prop_assert_eq!(got.outcode, i32::from(outcode(want)));
+                    if got.outcode == 0 {
+                        prop_assert_eq!(got.position, snap(want));
+                    }
+                }
+            }
+        }
+    }
 }
