@@ -212,7 +212,7 @@ impl PixelBox {
 const BACK_OFFSET_PX: f32 = 0.125;
 
 /// The reversed depth of a triangle, as a function of the pixel alone.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DepthPlane {
     /// The pixel that `base` belongs to.
     pub anchor: [i32; 2],

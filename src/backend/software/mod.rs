@@ -41,7 +41,7 @@ use repaint::Job;
 use resolve::Painter;
 use shares::Shares;
 use std::fmt;
-use tile::{Grid, TILE_SIDE, Tile, pixel_index};
+use tile::{Grid, TILE_SIDE, Tile};
 use transform::Vertices;
 use visible::Visible;
 
@@ -126,7 +126,7 @@ impl SoftwareBackend {
         (0..grid.height as usize).flat_map(move |y| {
             (0..grid.width as usize).map(move |x| {
                 let tile = &self.tiles[y / TILE_SIDE * grid.columns + x / TILE_SIDE];
-                let slot = tile.slot[pixel_index(x % TILE_SIDE, y % TILE_SIDE)];
+                let slot = tile.slot_at(x % TILE_SIDE, y % TILE_SIDE);
                 (slot, [x as i32, y as i32])
             })
         })
@@ -202,8 +202,8 @@ impl Backend for SoftwareBackend {
             shares: &self.shares,
             serial: self.serial,
         };
-        exec.for_each_chunk(&mut self.tiles, 1, |_, tile| {
-            dispatch!(exec.level, simd => resolve::resolve_tile(simd, &mut tile[0], &painter, paint));
+        exec.for_each_chunk(&mut self.tiles, 1, |index, tile| {
+            dispatch!(exec.level, simd => resolve::resolve_tile(simd, &mut tile[0], index, &painter, paint));
         });
     }
 

@@ -3,10 +3,13 @@
 //! A target says which writer filled it and when. Every tile knows when it changed last; so a target of ours lacks
 //! exactly the tiles that changed after its stamp, and any other target lacks all.
 
-use super::tile::{BLOCK_PIXELS, BLOCK_SIDE, Grid, TILE_SIDE, Tile, pixel_index};
+use super::tile::{BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, Grid, TILE_SIDE, Tile};
 use crate::output::target::PIXEL_BYTES;
 use crate::output::{ChannelOrder, Stamp, Target};
 use crate::parallel::Exec;
+
+/// Bytes of a row of a block.
+const BLOCK_ROW_BYTES: usize = BLOCK_SIDE * PIXEL_BYTES;
 
 /// Brings `target` from its own state to that of `now`. Returns the number of pixels written.
 pub(super) fn present(
@@ -57,20 +60,22 @@ pub(super) fn stale_tiles(tiles: &[Tile], known: Option<u64>) -> impl Iterator<I
 fn copy_tile(tile: &Tile, stride: usize, band: &mut [u8], bytes_of: impl Fn(u32) -> [u8; 4]) {
     let left = tile.origin[0] as usize * PIXEL_BYTES;
     let width = tile.width as usize * PIXEL_BYTES;
-    for (y, row) in band
-        .chunks_mut(stride)
-        .enumerate()
-        .take(tile.height as usize)
-    {
+    let (blocks, _) = tile.colour.as_chunks::<BLOCK_PIXELS>();
+    for (y, row) in band.chunks_mut(stride).enumerate().take(tile.height as usize) {
         // The same row of each block; blocks follow each other.
-        let first = pixel_index(0, y);
-        let blocks = tile.colour[first..].chunks(BLOCK_PIXELS);
-        let pieces = row[left..left + width].chunks_mut(BLOCK_SIDE * PIXEL_BYTES);
-        for (piece, block) in pieces.zip(blocks) {
-            let (pixels, _) = piece.as_chunks_mut::<PIXEL_BYTES>();
-            for (pixel, &colour) in pixels.iter_mut().zip(block) {
+        let first = y % BLOCK_SIDE * BLOCK_SIDE;
+        let blocks = &blocks[y / BLOCK_SIDE * BLOCKS_ACROSS..];
+        let (whole, part) = row[left..left + width].as_chunks_mut::<BLOCK_ROW_BYTES>();
+        let behind = &blocks[whole.len().min(blocks.len() - 1)];
+        for (to, block) in whole.iter_mut().zip(blocks) {
+            let (to, _) = to.as_chunks_mut::<PIXEL_BYTES>();
+            for (pixel, &colour) in to.iter_mut().zip(&block[first..first + BLOCK_SIDE]) {
                 *pixel = bytes_of(colour);
             }
+        }
+        let (part, _) = part.as_chunks_mut::<PIXEL_BYTES>();
+        for (pixel, &colour) in part.iter_mut().zip(&behind[first..]) {
+            *pixel = bytes_of(colour);
         }
     }
 }

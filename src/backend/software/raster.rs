@@ -6,7 +6,8 @@
 //! that no pixel of the blocks in question violates is left out; if every pixel violates one, so are the blocks. Any other changes
 //! its sign within 64 x 64 pixels, hence is nowhere larger than `63 * 2^24 < 2^30`: `i32` does not overflow.
 //!
-//! A **small** piece, whose edges are shorter than [`SMALL`] and which touches at most 2 x 2 blocks, needs no such questions: all
+//! A **small** piece, whose edges are shorter than [`SMALL`] and which touches at most
+//! 3 x 3 blocks, needs no such questions: all
 //! numbers are small, and every block is tried. Others go through **rows of blocks**: for all blocks of a row at once, lanes tell
 //! which of them an edge rules out, which lie inside of all edges, and in which the piece nowhere comes nearer than what is there
 //! already. The latter is known by a depth for each block that none of its pixels is farther than. It rises when a piece covers
@@ -19,7 +20,7 @@
 use super::setup::Piece;
 use super::shares::{Share, add_pixels};
 use super::tile::{
-    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, NO_DEPTH, NO_TRIANGLE, TILE_BLOCKS, TILE_PIXELS,
+    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, BlockSet, NO_DEPTH, NO_TRIANGLE, TILE_BLOCKS, TILE_PIXELS,
     TILE_SIDE, Tile,
 };
 use crate::geometry::screen::{DepthPlane, EdgeFunction, SUBPIXEL_BITS};
@@ -29,7 +30,11 @@ use fearless_simd::{Select, SimdBase, SimdInt, SimdMask};
 /// Three edges, and the right and the lower border of the image.
 const MOST_EDGES: usize = 5;
 
-/// Edges shorter than this along both axes, in sub-pixels, have values that fit `i32` wherever a piece of at most 2 x 2 blocks looks.
+/// A small piece touches at most so many blocks along each axis: they are tried one by one in less time than it takes to find
+/// out which of them have a pixel.
+const SMALL_BLOCKS: usize = 3;
+
+/// A small piece's edges are shorter than this along both axes, in sub-pixels, so that their values fit `i32` wherever it is drawn.
 const SMALL: i32 = 16 << SUBPIXEL_BITS;
 
 /// Most vectors in a block: at four lanes.
@@ -38,13 +43,14 @@ const MOST_PARTS: usize = 4;
 /// Draws a tile's triangles and counts the pixels of each.
 #[inline(always)]
 pub(super) fn draw_tile<S: Simd>(simd: S, tile: &mut Tile, index: usize, shares: &[Share]) {
-    tile.clear();
+    tile.owned = BlockSet::default();
+    tile.covered = 0;
     let mut pieces = shares.iter().flat_map(|share| share.bin(index)).peekable();
     if pieces.peek().is_none() {
         return;
     }
     let mut canvas = Canvas {
-        depth: [NO_DEPTH; TILE_PIXELS],
+        depth: [0.0; TILE_PIXELS],
         farthest: [NO_DEPTH; TILE_BLOCKS],
         lanes: Lanes::new(simd),
         tile,
@@ -334,7 +340,7 @@ impl<S: Simd, const N: usize> Brush<S, N> {
 /// A tile that is being drawn.
 struct Canvas<'a, S: Simd> {
     tile: &'a mut Tile,
-    /// Reversed depth of each pixel, or [`NO_DEPTH`].
+    /// Reversed depth of each pixel of an owned block, or [`NO_DEPTH`].
     depth: [f32; TILE_PIXELS],
     /// A depth that no pixel of a block is farther than.
     farthest: [f32; TILE_BLOCKS],
@@ -352,7 +358,7 @@ impl<S: Simd> Canvas<'_, S> {
             x1: block(pixels.x1),
             y1: block(pixels.y1),
         };
-        let is_small = range.x1 - range.x0 < 2 && range.y1 - range.y0 < 2;
+        let is_small = range.x1 - range.x0 < SMALL_BLOCKS && range.y1 - range.y0 < SMALL_BLOCKS;
         if is_small && is_inner(self.tile) {
             let [left, top] = [range.x0, range.y0].map(|block| (block * BLOCK_SIDE) as i32);
             let first = [self.tile.origin[0] + left, self.tile.origin[1] + top];
@@ -381,14 +387,19 @@ impl<S: Simd> Canvas<'_, S> {
         let side = BLOCK_SIDE as i32;
         for y in range.y0..=range.y1 {
             let row_depths = brush.row_depths(simd, &self.lanes, y);
-            for x in range.x0..=range.x1 {
-                let [right, below] = [(x - range.x0) as i32 * side, (y - range.y0) as i32 * side];
-                let mut corner = [0; 3];
-                for k in 0..3 {
-                    corner[k] = edges[k].start + right * edges[k].dx + below * edges[k].dy;
-                }
-                self.draw_block::<3, false>(simd, &brush, &row_depths, [x, y], &corner);
+            let below = (y - range.y0) as i32 * side;
+            let mut corner = [0; 3];
+            for k in 0..3 {
+                corner[k] = edges[k].start + below * edges[k].dy;
             }
+            let mut owned = self.tile.owned.row(y);
+            for x in range.x0..=range.x1 {
+                self.draw_block::<3, false>(simd, &brush, &row_depths, [x, y], &corner, &mut owned);
+                for k in 0..3 {
+                    corner[k] += edges[k].dx * side;
+                }
+            }
+            self.tile.owned.insert_row(y, owned);
         }
     }
 
@@ -426,6 +437,7 @@ impl<S: Simd> Canvas<'_, S> {
                         .select(least.max(farthest), farthest)
                         .store_slice(&mut self.farthest[at..at + width]);
                 }
+                let mut owned = self.tile.owned.row(y);
                 while left != 0 {
                     let bit = left.trailing_zeros() as usize;
                     left &= left - 1;
@@ -434,18 +446,22 @@ impl<S: Simd> Canvas<'_, S> {
                         corner[k] += (right + bit as i32 * side).wrapping_mul(edges[k].dx);
                     }
                     let place = [first + bit, y];
+                    let (rows, corner) = (&row_depths, &corner);
                     if full >> bit & 1 == 1 {
-                        self.draw_block::<N, true>(simd, &brush, &row_depths, place, &corner);
+                        self.draw_block::<N, true>(simd, &brush, rows, place, corner, &mut owned);
                     } else {
-                        self.draw_block::<N, false>(simd, &brush, &row_depths, place, &corner);
+                        self.draw_block::<N, false>(simd, &brush, rows, place, corner, &mut owned);
                     }
                 }
+                self.tile.owned.insert_row(y, owned);
             }
         }
     }
 
-    /// Draws a block's pixels: all of them, or those that violate no edge, whose values at the first pixel are given.
+    /// Draws a block's pixels: all of them, or those that violate no edge, whose values at the first pixel are given. `owned`
+    /// has a bit for each block of the row in which some pixel has a triangle: what the others hold is from an older image.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "the innermost of three loops")]
     fn draw_block<const N: usize, const IS_FULL: bool>(
         &mut self,
         simd: S,
@@ -453,31 +469,50 @@ impl<S: Simd> Canvas<'_, S> {
         row_depths: &[S::f32s; MOST_PARTS],
         [x, y]: [usize; 2],
         corner: &[i32; N],
+        owned: &mut u64,
     ) {
         let width = S::i32s::LEN;
-        let block = y * BLOCKS_ACROSS + x;
+        let first = (y * BLOCKS_ACROSS + x) * BLOCK_PIXELS;
+        let is_owned = *owned >> x & 1 == 1;
         let zero = S::i32s::splat(simd, 0);
+        let mut wins = [S::mask32s::splat(simd, true); MOST_PARTS];
+        let mut depths = [S::f32s::splat(simd, 0.0); MOST_PARTS];
+        let mut any = IS_FULL && !is_owned;
         for part in 0..Lanes::<S>::parts() {
             let column = self.lanes.column[part] + brush.column(x);
-            let depth = brush.depths(simd, row_depths[part], column);
-            let at = block * BLOCK_PIXELS + part * width;
-            let stored = S::f32s::from_slice(simd, &self.depth[at..at + width]);
-            let mut wins = depth.simd_gt(stored);
+            depths[part] = brush.depths(simd, row_depths[part], column);
             if !IS_FULL {
                 let mut signs = zero;
                 for k in 0..N {
                     signs |= brush.inside_block[k][part] + corner[k];
                 }
-                wins &= signs.simd_ge(zero);
+                wins[part] = signs.simd_ge(zero);
             }
-            if wins.any_true() {
-                let owner = S::u32s::from_slice(simd, &self.tile.slot[at..at + width]);
-                wins.select(depth, stored)
-                    .store_slice(&mut self.depth[at..at + width]);
-                wins.select(brush.slot, owner)
-                    .store_slice(&mut self.tile.slot[at..at + width]);
-                self.tile.owned.insert(block);
+            if is_owned {
+                let at = first + part * width;
+                let stored = S::f32s::from_slice(simd, &self.depth[at..at + width]);
+                wins[part] &= depths[part].simd_gt(stored);
             }
+            any |= wins[part].any_true();
+        }
+        if !any {
+            return;
+        }
+        *owned |= 1 << x;
+        for part in 0..Lanes::<S>::parts() {
+            let at = first + part * width;
+            let depth = &mut self.depth[at..at + width];
+            let slot = &mut self.tile.slot[at..at + width];
+            let (mut stored, mut owner) = (
+                S::f32s::splat(simd, NO_DEPTH),
+                S::u32s::splat(simd, NO_TRIANGLE),
+            );
+            if is_owned {
+                stored = S::f32s::from_slice(simd, depth);
+                owner = S::u32s::from_slice(simd, slot);
+            }
+            wins[part].select(depths[part], stored).store_slice(depth);
+            wins[part].select(brush.slot, owner).store_slice(slot);
         }
     }
 }

@@ -384,13 +384,18 @@ impl Batch {
         let (mut len, mut chunks_len) = (0, 0);
         while search.is_open() {
             let [y0, y1] = search.rows_here();
+            let owned = tile.owned.row(search.block_row);
             while search.next < search.end {
                 if len + BLOCK_PIXELS > BATCH {
                     (self.len, self.chunks_len) = (len, chunks_len);
                     return;
                 }
-                let block = search.block_row * BLOCKS_ACROSS + search.next;
+                let column = search.next;
                 search.next += 1;
+                if owned >> column & 1 == 0 {
+                    continue;
+                }
+                let block = search.block_row * BLOCKS_ACROSS + column;
                 let within = rows.within_block(block_corner(block), y0, y1);
                 for part in 0..BLOCK_PIXELS / lanes {
                     let at = block * BLOCK_PIXELS + part * lanes;

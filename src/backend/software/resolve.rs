@@ -52,6 +52,7 @@ impl<'a> Painter<'a> {
 pub(super) fn resolve_tile<S: Simd>(
     simd: S,
     tile: &mut Tile,
+    index: usize,
     painter: &Painter<'_>,
     paint: BasePaint<'_>,
 ) {
@@ -61,6 +62,7 @@ pub(super) fn resolve_tile<S: Simd>(
     if tile.owned.is_empty() {
         return;
     }
+    painter.shares.fetch(index);
     match paint {
         // Parts are for backends that cannot repaint.
         BasePaint::Gouraud(colours) | BasePaint::Refined { colours, .. } => {

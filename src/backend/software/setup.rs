@@ -29,7 +29,7 @@ use fearless_simd::prelude::*;
 const BATCH: usize = 16;
 
 /// A triangle, or a piece of a clipped one, ready to be drawn: one cache line.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub(super) struct Piece {
     /// The triangle's slot.
@@ -43,7 +43,7 @@ pub(super) struct Piece {
 }
 
 /// What colouring the pixels of a drawn triangle takes: one cache line.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub(super) struct Drawn {
     /// Slopes to the right and down, and value at the first pixel of `bounds`, of each corner's barycentric plane.
@@ -311,25 +311,25 @@ impl Setup<'_> {
         }
         let world = self.geometry.world;
         let planes = pending.corners.planes(simd);
-        for (i, waiting) in pending.triangles[..pending.len].iter().enumerate() {
-            let mut depth = planes.depth(i, waiting.bounds.anchor());
+        let waiting = &pending.triangles[..pending.len];
+        let (first_slot, drawn, pieces) = share.extend(waiting.len());
+        for (i, ((waiting, drawn), piece)) in waiting.iter().zip(drawn).zip(pieces).enumerate() {
+            // Field by field: a record put together elsewhere would have to be copied.
+            drawn.planes = planes.interpolator(i);
+            drawn.bounds = waiting.bounds;
+            drawn.id = waiting.id;
+            drawn.vertices = waiting.vertices;
+            drawn.material = world.triangle_material[waiting.id as usize];
+            piece.slot = first_slot + i as u32;
+            piece.bounds = waiting.bounds;
+            piece.corners = waiting.corners;
+            piece.depth = planes.depth(i, waiting.bounds.anchor());
             if world.backs.contains(&waiting.id) {
-                depth = depth.moved_back();
+                piece.depth = piece.depth.moved_back();
             }
-            let slot = share.push(Drawn {
-                planes: planes.interpolator(i),
-                bounds: waiting.bounds,
-                id: waiting.id,
-                vertices: waiting.vertices,
-                material: world.triangle_material[waiting.id as usize],
-                is_clipped: false,
-            });
-            share.pieces.push(Piece {
-                slot,
-                bounds: waiting.bounds,
-                corners: waiting.corners,
-                depth,
-            });
+        }
+        for waiting in waiting {
+            share.count_from_zero(waiting.bounds);
         }
         share.counts.drawn += pending.len as u64;
         pending.len = 0;

@@ -8,6 +8,7 @@
 //! would have to be looked up first, in a list as long as the world has triangles.
 
 use super::setup::{Drawn, Piece};
+use super::tile::Bounds;
 use crate::backend::{Geometry, RasterCounts};
 use crate::geometry::screen::DepthPlane;
 use std::ops::Range;
@@ -91,17 +92,39 @@ impl Share {
     }
 
     /// Puts a triangle at the next place, and returns its slot.
-    #[inline(always)]
     pub(super) fn push(&mut self, drawn: Drawn) -> u32 {
-        let slot = self.index << PLACE_BITS | self.drawn.len() as u32;
-        let count = if drawn.bounds.is_in_one_tile() {
+        let slot = self.next_slot();
+        self.count_from_zero(drawn.bounds);
+        self.drawn.push(drawn);
+        slot
+    }
+
+    /// Makes room for triangles, each with one piece, at the next places; the first of them has the slot returned. What they are
+    /// is to be filled in, and [`count_from_zero`](Self::count_from_zero) to be called for each.
+    #[inline(always)]
+    pub(super) fn extend(&mut self, count: usize) -> (u32, &mut [Drawn], &mut [Piece]) {
+        let slot = self.next_slot();
+        let (triangles, pieces) = (self.drawn.len(), self.pieces.len());
+        self.drawn.resize(triangles + count, Drawn::default());
+        self.pieces.resize(pieces + count, Piece::default());
+        (slot, &mut self.drawn[triangles..], &mut self.pieces[pieces..])
+    }
+
+    /// Begins to count the pixels of the next triangle, which may have those in `bounds`.
+    #[inline(always)]
+    pub(super) fn count_from_zero(&mut self, bounds: Bounds) {
+        let count = if bounds.is_in_one_tile() {
             0
         } else {
             IN_SEVERAL_TILES
         };
         self.pixels.push(AtomicU32::new(count));
-        self.drawn.push(drawn);
-        slot
+    }
+
+    /// The slot of the next place.
+    #[inline(always)]
+    fn next_slot(&self) -> u32 {
+        self.index << PLACE_BITS | self.drawn.len() as u32
     }
 
     /// The pieces in a tile's bin.
@@ -177,6 +200,23 @@ impl Shares {
     #[inline(always)]
     pub(super) fn drawn(&self, slot: u32) -> &Drawn {
         &self.all[(slot >> PLACE_BITS) as usize].drawn[place(slot)]
+    }
+
+    /// Brings what is known about a tile's triangles into the cache.
+    ///
+    /// Colouring asks for one triangle after the other, in the order of their pixels, and waits for memory each time: half of
+    /// its time on a fine mesh. In the order of the bins they lie next to each other for the most part, and loads
+    /// that do not wait for one another overlap.
+    #[inline(always)]
+    pub(super) fn fetch(&self, tile: usize) {
+        let mut sum = 0_u32;
+        for share in self.used() {
+            for piece in share.bin(tile) {
+                sum = sum.wrapping_add(share.drawn[place(piece.slot)].id);
+            }
+        }
+        // Somebody might want to know.
+        std::hint::black_box(sum);
     }
 
     /// The depth of the triangle that has a slot.

@@ -9,7 +9,8 @@
 //!
 //! **What is kept.** Ids and colours persist from pass to pass. Depths do not: while a tile's triangles are drawn they live on
 //! the drawing thread's stack, in its first-level cache, and never go to memory. Sets of blocks say where there is anything at all:
-//! a block that shows nothing but background, and did so before, is not touched again.
+//! a block that shows nothing but background, and did so before, is not touched again. Nothing is cleared: a block that no triangle
+//! has drawn into yet counts as empty, whatever it holds.
 //!
 //! Tiles at the right and the bottom may hang over the image; their pixels outside never get a triangle.
 
@@ -58,10 +59,18 @@ pub(super) fn block_corner(block: usize) -> [i32; 2] {
 pub(super) struct BlockSet([u64; 4]);
 
 impl BlockSet {
-    /// Adds a block.
+    /// Adds blocks of a row, one bit for each column.
     #[inline(always)]
-    pub(super) fn insert(&mut self, block: usize) {
-        self.0[block / 64 % 4] |= 1 << (block % 64);
+    pub(super) fn insert_row(&mut self, row: usize, columns: u64) {
+        let first = row * BLOCKS_ACROSS;
+        self.0[first / 64 % 4] |= columns << (first % 64);
+    }
+
+    /// The blocks of a row, one bit for each column.
+    #[inline(always)]
+    pub(super) fn row(self, row: usize) -> u64 {
+        let first = row * BLOCKS_ACROSS;
+        self.0[first / 64 % 4] >> (first % 64) & ((1 << BLOCKS_ACROSS) - 1)
     }
 
     /// True when no block is in the set.
@@ -95,7 +104,8 @@ impl BlockSet {
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct Tile {
-    /// The slot of the triangle that owns each pixel (see [`shares`](super::shares)), or [`NO_TRIANGLE`].
+    /// The slot of the triangle that owns each pixel of an owned block (see [`shares`](super::shares)), or [`NO_TRIANGLE`]. What
+    /// other blocks hold is left from older images.
     pub slot: [u32; TILE_PIXELS],
     /// Encoded colour of each pixel, RGBA from the lowest byte up.
     pub colour: [u32; TILE_PIXELS],
@@ -136,14 +146,13 @@ impl Tile {
         }
     }
 
-    /// Takes all triangles off.
-    pub(super) fn clear(&mut self) {
-        for block in self.owned.iter() {
-            let at = block * BLOCK_PIXELS;
-            self.slot[at..at + BLOCK_PIXELS].fill(NO_TRIANGLE);
+    /// The slot of the pixel in column `x` and row `y`, or [`NO_TRIANGLE`].
+    pub(super) fn slot_at(&self, x: usize, y: usize) -> u32 {
+        if self.owned.row(y / BLOCK_SIDE) >> (x / BLOCK_SIDE) & 1 == 1 {
+            self.slot[pixel_index(x, y)]
+        } else {
+            NO_TRIANGLE
         }
-        self.owned = BlockSet::default();
-        self.covered = 0;
     }
 
     /// Pixels inside the image.
