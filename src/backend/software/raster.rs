@@ -294,8 +294,7 @@ impl<S: Simd, const N: usize> Brush<S, N> {
 
     /// Depths in the columns given from the anchor, given the part that depends on the row.
     #[inline(always)]
-    fn depths(&self, simd: S, row_depth: S::f32s, column: S::i32s) -> S::f32s {
-        let column: S::f32s = column.to_float();
+    fn depths(&self, simd: S, row_depth: S::f32s, column: S::f32s) -> S::f32s {
         let depth = row_depth + column * self.plane.dx;
         let (near, far) = (self.plane.max, self.plane.min);
         depth
@@ -314,7 +313,7 @@ impl<S: Simd, const N: usize> Brush<S, N> {
         for (range, (column, row)) in ranges.iter_mut().zip(columns.into_iter().zip(rows)) {
             let row = (self.row(y) + row) as f32;
             let row_depth = S::f32s::splat(simd, self.plane.base + self.plane.dy * row);
-            *range = self.depths(simd, row_depth, first + column);
+            *range = self.depths(simd, row_depth, (first + column).to_float());
         }
         ranges
     }
@@ -380,26 +379,46 @@ impl<S: Simd> Canvas<'_, S> {
         }
     }
 
-    /// Draws those pixels of a few blocks that violate none of a small piece's edges.
+    /// Draws those pixels of a few blocks that violate none of a small piece's edges. What changes from block to block is kept in
+    /// lanes and stepped.
     #[inline(always)]
     fn draw_each(&mut self, simd: S, piece: &Piece, edges: [BlockEdge; 3], range: BlockRange) {
         let brush = Brush::new(simd, &self.lanes, piece, edges, self.tile.origin);
-        let side = BLOCK_SIDE as i32;
+        let (side, parts) = (BLOCK_SIDE as i32, Lanes::<S>::parts());
+        let zero = S::i32s::splat(simd, 0);
+        let mut row_values = brush.inside_block;
+        let mut columns = [S::f32s::splat(simd, 0.0); MOST_PARTS];
+        for part in 0..parts {
+            for k in 0..3 {
+                row_values[k][part] += edges[k].start;
+            }
+            columns[part] = (self.lanes.column[part] + brush.column(range.x0)).to_float();
+        }
         for y in range.y0..=range.y1 {
             let row_depths = brush.row_depths(simd, &self.lanes, y);
-            let below = (y - range.y0) as i32 * side;
-            let mut corner = [0; 3];
-            for k in 0..3 {
-                corner[k] = edges[k].start + below * edges[k].dy;
-            }
             let mut owned = self.tile.owned.row(y);
+            let (mut values, mut columns) = (row_values, columns);
             for x in range.x0..=range.x1 {
-                self.draw_block::<3, false>(simd, &brush, &row_depths, [x, y], &corner, &mut owned);
-                for k in 0..3 {
-                    corner[k] += edges[k].dx * side;
+                let mut inside = [S::mask32s::splat(simd, true); MOST_PARTS];
+                let mut depths = columns;
+                for part in 0..parts {
+                    let mut signs = zero;
+                    for k in 0..3 {
+                        signs |= values[k][part];
+                        values[k][part] += edges[k].dx * side;
+                    }
+                    inside[part] = signs.simd_ge(zero);
+                    depths[part] = brush.depths(simd, row_depths[part], columns[part]);
+                    columns[part] += side as f32;
                 }
+                self.put(simd, brush.slot, [x, y], inside, depths, &mut owned);
             }
             self.tile.owned.insert_row(y, owned);
+            for k in 0..3 {
+                for part in 0..parts {
+                    row_values[k][part] += edges[k].dy * side;
+                }
+            }
         }
     }
 
@@ -458,8 +477,7 @@ impl<S: Simd> Canvas<'_, S> {
         }
     }
 
-    /// Draws a block's pixels: all of them, or those that violate no edge, whose values at the first pixel are given. `owned`
-    /// has a bit for each block of the row in which some pixel has a triangle: what the others hold is from an older image.
+    /// Draws a block's pixels: all of them, or those that violate no edge, whose values at the first pixel are given.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the innermost of three loops")]
     fn draw_block<const N: usize, const IS_FULL: bool>(
@@ -471,28 +489,47 @@ impl<S: Simd> Canvas<'_, S> {
         corner: &[i32; N],
         owned: &mut u64,
     ) {
-        let width = S::i32s::LEN;
-        let first = (y * BLOCKS_ACROSS + x) * BLOCK_PIXELS;
-        let is_owned = *owned >> x & 1 == 1;
-        let zero = S::i32s::splat(simd, 0);
-        let mut wins = [S::mask32s::splat(simd, true); MOST_PARTS];
-        let mut depths = [S::f32s::splat(simd, 0.0); MOST_PARTS];
-        let mut any = IS_FULL && !is_owned;
+        let mut inside = [S::mask32s::splat(simd, true); MOST_PARTS];
+        let mut depths = *row_depths;
         for part in 0..Lanes::<S>::parts() {
-            let column = self.lanes.column[part] + brush.column(x);
+            let column: S::f32s = (self.lanes.column[part] + brush.column(x)).to_float();
             depths[part] = brush.depths(simd, row_depths[part], column);
             if !IS_FULL {
-                let mut signs = zero;
+                let mut signs = S::i32s::splat(simd, 0);
                 for k in 0..N {
                     signs |= brush.inside_block[k][part] + corner[k];
                 }
-                wins[part] = signs.simd_ge(zero);
+                inside[part] = signs.simd_ge(S::i32s::splat(simd, 0));
             }
-            if is_owned {
-                let at = first + part * width;
-                let stored = S::f32s::from_slice(simd, &self.depth[at..at + width]);
-                wins[part] &= depths[part].simd_gt(stored);
-            }
+        }
+        self.put(simd, brush.slot, [x, y], inside, depths, owned);
+    }
+
+    /// Gives a triangle those of a block's pixels that are inside of it and where it is nearest. `owned`
+    /// has a bit for each block of the row in which some pixel has a triangle: what the others hold is from an older image.
+    #[inline(always)]
+    fn put(
+        &mut self,
+        simd: S,
+        slot: S::u32s,
+        [x, y]: [usize; 2],
+        inside: [S::mask32s; MOST_PARTS],
+        depths: [S::f32s; MOST_PARTS],
+        owned: &mut u64,
+    ) {
+        let width = S::i32s::LEN;
+        let first = (y * BLOCKS_ACROSS + x) * BLOCK_PIXELS;
+        // Without branches: whether a block of a fine mesh is the first to be drawn into is hard to predict.
+        let known = S::mask32s::splat(simd, *owned >> x & 1 == 1);
+        let nothing = S::f32s::splat(simd, NO_DEPTH);
+        let nobody = S::u32s::splat(simd, NO_TRIANGLE);
+        let (mut wins, mut stored) = (inside, depths);
+        let mut any = false;
+        for part in 0..Lanes::<S>::parts() {
+            let at = first + part * width;
+            let depth = S::f32s::from_slice(simd, &self.depth[at..at + width]);
+            stored[part] = known.select(depth, nothing);
+            wins[part] &= depths[part].simd_gt(stored[part]);
             any |= wins[part].any_true();
         }
         if !any {
@@ -501,18 +538,12 @@ impl<S: Simd> Canvas<'_, S> {
         *owned |= 1 << x;
         for part in 0..Lanes::<S>::parts() {
             let at = first + part * width;
-            let depth = &mut self.depth[at..at + width];
-            let slot = &mut self.tile.slot[at..at + width];
-            let (mut stored, mut owner) = (
-                S::f32s::splat(simd, NO_DEPTH),
-                S::u32s::splat(simd, NO_TRIANGLE),
-            );
-            if is_owned {
-                stored = S::f32s::from_slice(simd, depth);
-                owner = S::u32s::from_slice(simd, slot);
-            }
-            wins[part].select(depths[part], stored).store_slice(depth);
-            wins[part].select(brush.slot, owner).store_slice(slot);
+            let stored_slot = &mut self.tile.slot[at..at + width];
+            let owner = known.select(S::u32s::from_slice(simd, stored_slot), nobody);
+            wins[part].select(slot, owner).store_slice(stored_slot);
+            wins[part]
+                .select(depths[part], stored[part])
+                .store_slice(&mut self.depth[at..at + width]);
         }
     }
 }
