@@ -102,8 +102,12 @@ impl Bound {
         }
     }
 
+    pub(super) fn is_bounded(&self) -> bool {
+        self.radius < f32::INFINITY
+    }
+
     /// The axis as a unit vector; zero if there is no cone.
-    pub(super) fn direction(&self) -> DVec3 {
+    fn direction(&self) -> DVec3 {
         wide(self.axis).normalize_or_zero()
     }
 

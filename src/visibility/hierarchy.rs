@@ -1,7 +1,8 @@
 //! Clusters in blocks of eight, and blocks in blocks of eight, up to one.
 //!
-//! Level 0 holds the bounds of clusters in their [`order`], level k those of sets of `8^k` consecutive ones, so that no
-//! block needs to store where its children are, nor how many clusters are below.
+//! Level 0 holds the bounds of clusters in their [`order`], which comes from hierarchies of boxes; level k holds those of
+//! sets of `8^k` consecutive ones, so that no block needs to store where its children are, nor how many clusters are
+//! below.
 //!
 //! A set's bounds come from all clusters below, not from the sets between, which keeps them tight.
 
