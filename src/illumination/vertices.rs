@@ -43,7 +43,8 @@ impl VertexSet {
         colours: &mut Vec3s,
     ) {
         let vertices = world.positions.len();
-        self.words.resize_with(vertices.div_ceil(WORD), AtomicU64::default);
+        self.words
+            .resize_with(vertices.div_ceil(WORD), AtomicU64::default);
         colours.resize(vertices);
         let words = &self.words;
         exec.for_each_index(triangles.len().div_ceil(TRIANGLES_PER_TASK), |task| {
@@ -66,7 +67,10 @@ impl VertexSet {
 }
 
 fn mark(words: &[AtomicU64], vertex: u32) {
-    let (word, bit) = (&words[vertex as usize / WORD], 1 << (vertex as usize % WORD));
+    let (word, bit) = (
+        &words[vertex as usize / WORD],
+        1 << (vertex as usize % WORD),
+    );
     // Looking first saves most of the atomic operations: a vertex has six triangles as a rule.
     if word.load(Ordering::Relaxed) & bit == 0 {
         word.fetch_or(bit, Ordering::Relaxed);
@@ -102,7 +106,9 @@ fn shade_words<S: Simd>(
                 left &= !mask;
                 let kit = match known {
                     Some((last, kit)) if last == material => kit,
-                    _ => ShadingKit::new(eye, &world.materials[usize::from(material)], &world.lights),
+                    _ => {
+                        ShadingKit::new(eye, &world.materials[usize::from(material)], &world.lights)
+                    }
                 };
                 known = Some((material, kit));
                 let group = Group { start, mask };

@@ -6,34 +6,29 @@
 //! corners, it is negative at every such vertex. For the first two this contradicts what clipping leaves, `w >= z >=
 //! 0`: there is no vertex. For the others it means that all vertices are beyond one side of the image by more than m,
 //! and still beyond it after the rounding to sub-pixels, so that the triangle's box holds no pixel centre. The bounds
-//! over the ball, and over the boxes of a bounding volume hierarchy about the balls, include all rounding: see the
-//! module `halfspace`.
+//! over the ball include all rounding: see the module `halfspace`.
 //!
 //! **Facing away**: see the module `facing`. Backs that are drawn have clusters of their own.
 //!
-//! A subtree that lies inside of one of the six half-spaces is not tested against it any more. Results do not depend
-//! on threads or SIMD: this is scalar `f64` arithmetic.
+//! **Sets** of clusters in a hierarchy are tested like clusters, eight at once, from the largest downwards. What was
+//! proved of a set holds below: half-spaces that it does not stick out of, and which way it faces, are not tested
+//! again. A set is dropped as a whole if it is outside of the view; within the view also if it faces away (at the
+//! border its clusters are still told apart, so that those outside are counted as such), and is taken as a whole if
+//! nothing in it faces away. So time goes to what is along the borders of the image and along silhouettes.
+//! Results are those of testing each cluster by itself, up to rounding, and do not depend on threads or SIMD.
 
+use super::block::{AWAY, Balls, Block, CROSSING, FRONT, LANES, OUTSIDE, State, States, UNCLIPPED};
 use super::facing::Facing;
 use super::halfspace::Linear;
+use super::hierarchy::{Hierarchy, Place};
+use super::runs::Runs;
 use crate::geometry::Cluster;
 use crate::scene::View;
-use glam::{DVec3, Vec3A};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use std::fmt;
 use std::ops::Range;
 
 /// How far outside of the image something must be to be dropped.
 const MARGIN_PX: f64 = 1.0;
-
-/// A bit for each of the six half-spaces.
-const ALL_PLANES: u8 = 0b11_1111;
-
-/// Coordinates up to this go into the hierarchy, whose builder squares them; clusters that reach beyond are always
-/// drawn.
-const LARGEST_COORDINATE: f32 = 1e15;
 
 /// What one [`Culler::cull`] did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,20 +48,20 @@ pub struct CullCounts {
 pub struct Culler {
     /// Ascending by triangles.
     clusters: Vec<Cluster>,
-    /// The hierarchy, its root first; a leaf holds one cluster, by its index in `clusters`.
-    hierarchy: Bvh2,
-    /// Clusters that are not in the hierarchy.
-    unbounded: Vec<u32>,
-    /// Nodes still to visit, and the half-spaces that they may stick out of.
-    stack: Vec<(u32, u8)>,
-    /// For each cluster, whether it is left.
-    kept: Vec<bool>,
+    hierarchy: Hierarchy,
+    /// The clusters that are left, by their indices.
+    kept: Runs,
+    /// Blocks still to visit, by their first bounds, and what is known of all that is in them.
+    stack: Vec<(Place, State)>,
+    /// How many blocks were visited for the last view.
+    visited: usize,
 }
 
 impl fmt::Debug for Culler {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Culler")
             .field("clusters", &self.clusters.len())
+            .field("visited", &self.visited)
             .finish_non_exhaustive()
     }
 }
@@ -77,61 +72,32 @@ impl Culler {
     pub fn new(clusters: &[Cluster]) -> Self {
         let mut clusters = clusters.to_vec();
         clusters.sort_by_key(|cluster| cluster.triangles.start);
-        let (mut boxes, mut bounded, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, cluster) in (0_u32..).zip(&clusters) {
-            if let Some(aabb) = bounding_box(cluster) {
-                boxes.push(aabb);
-                bounded.push(index);
-            } else {
-                unbounded.push(index);
-            }
-        }
-        let hierarchy = PlocBuilder::new().build(
-            PlocSearchDistance::Medium,
-            &boxes,
-            bounded,
-            SortPrecision::U64,
-            0,
-        );
+        let hierarchy = Hierarchy::new(&clusters);
+        let depth = hierarchy.top().map_or(0, |top| top + 1);
         Self {
-            kept: vec![false; clusters.len()],
-            // Taking one node off and putting two on adds one for each level.
-            stack: Vec::with_capacity(hierarchy.max_depth + 2),
+            kept: Runs::new(clusters.iter().map(|cluster| cluster.triangles.clone())),
+            // Taking one block off and putting eight on adds seven for each level.
+            stack: Vec::with_capacity(LANES * depth),
             hierarchy,
             clusters,
-            unbounded,
+            visited: 0,
         }
     }
 
     /// Takes over the bounds of the same clusters, in ascending order of their triangles, after some of them have moved:
-    /// the hierarchy keeps its shape, and its boxes grow or shrink. Allocates only if a cluster's coordinates have become
-    /// reasonable or ceased to be so.
+    /// the hierarchy keeps its shape, and the bounds of sets in which something has moved grow or shrink. Allocates
+    /// nothing.
     ///
     /// # Panics
     /// When the clusters' triangles are not those of before.
     pub fn refit(&mut self, clusters: &[Cluster]) {
         assert_eq!(clusters.len(), self.clusters.len(), "the same clusters");
-        for (old, new) in self.clusters.iter_mut().zip(clusters) {
+        for (old, new) in self.clusters.iter().zip(clusters) {
             assert_eq!(old.triangles, new.triangles, "the same clusters");
-            old.clone_from(new);
         }
-        let indices = (0_u32..).zip(&self.clusters);
-        let unbounded = indices.filter(|(_, cluster)| bounding_box(cluster).is_none());
-        if !unbounded
-            .map(|(index, _)| index)
-            .eq(self.unbounded.iter().copied())
-        {
-            *self = Self::new(clusters);
-            return;
-        }
-        for node in &mut self.hierarchy.nodes {
-            if node.is_leaf()
-                && let Some(aabb) = bounding_box(&self.clusters[node.first_index as usize])
-            {
-                node.set_aabb(aabb);
-            }
-        }
-        self.hierarchy.refit_all();
+        let old = &self.clusters;
+        self.hierarchy.refit(clusters, |i| old[i] != clusters[i]);
+        self.clusters.clone_from_slice(clusters);
     }
 
     /// Writes the triangles that may be visible to `out`, as ascending, disjoint and never adjacent ranges.
@@ -139,133 +105,128 @@ impl Culler {
     /// Every triangle with a pixel is among them, by the rules of [`geometry::screen`](crate::geometry::screen).
     /// Allocates only where `out` is too small to hold a range for every second cluster.
     pub fn cull(&mut self, view: &View, out: &mut Vec<Range<u32>>) -> CullCounts {
-        let facing = Facing::new(&view.pixel_from_world);
-        let planes = frustum(view);
-        let mut counts = CullCounts {
-            clusters: self.clusters.len() as u32,
-            ..CullCounts::default()
-        };
-        self.kept.fill(false);
-        for &index in &self.unbounded {
-            self.kept[index as usize] = true;
-        }
-        let mut inside = self.unbounded.len() as u32;
+        let tests = Tests::new(view);
+        self.kept.clear();
+        let mut facing_away = 0;
+        self.visited = 0;
         self.stack.clear();
-        if !self.hierarchy.nodes.is_empty() {
-            self.stack.push((0, ALL_PLANES));
+        if let Some(level) = self.hierarchy.top() {
+            self.stack.push((Place { level, position: 0 }, CROSSING));
         }
-        while let Some((index, candidates)) = self.stack.pop() {
-            let node = self.hierarchy.nodes[index as usize];
-            let Some(crossed) = crossed_by_box(&planes, node.aabb(), candidates) else {
-                continue;
+        while let Some((first, state)) = self.stack.pop() {
+            self.visited += 1;
+            let is_set = first.level > 0;
+            let states = tests.states(self.hierarchy.block(first), state, is_set);
+            facing_away += if is_set {
+                self.visit_sets(first, &states)
+            } else {
+                self.visit_clusters(first, &states)
             };
-            if !node.is_leaf() {
-                self.stack.push((node.first_index + 1, crossed));
-                self.stack.push((node.first_index, crossed));
+        }
+        let clusters = self.clusters.len() as u32;
+        let kept = self.kept.count();
+        CullCounts {
+            clusters,
+            outside_frustum: clusters - kept - facing_away,
+            facing_away,
+            triangles: self.kept.write(out),
+        }
+    }
+
+    /// Drops or keeps each set of a block, or puts what it consists of on the stack. Returns how many clusters were
+    /// dropped because they face away.
+    fn visit_sets(&mut self, first: Place, states: &States) -> u32 {
+        let mut away = 0;
+        for (position, &state) in self.hierarchy.lanes(first).zip(states) {
+            let place = Place { position, ..first };
+            if state & OUTSIDE != 0 {
                 continue;
             }
-            let index = node.first_index as usize;
-            let cluster = &self.clusters[index];
-            if is_outside(&planes, cluster, crossed) {
-                continue;
-            }
-            inside += 1;
-            if facing.is_away(cluster) {
-                counts.facing_away += 1;
+            let is_inside = state & CROSSING == 0;
+            if is_inside && state & AWAY != 0 {
+                away += self.hierarchy.below(place).len() as u32;
+            } else if is_inside && state & FRONT != 0 {
+                for position in self.hierarchy.below(place) {
+                    self.kept.insert(self.hierarchy.cluster(position));
+                }
             } else {
-                self.kept[index] = true;
+                let children = Place {
+                    level: first.level - 1,
+                    position: position * LANES,
+                };
+                self.stack.push((children, state));
             }
         }
-        counts.outside_frustum = counts.clusters - inside;
-        counts.triangles = self.collect(out);
-        counts
+        away
     }
 
-    /// Writes the kept clusters' triangles to `out`, adjacent ranges joined; returns how many triangles.
-    fn collect(&self, out: &mut Vec<Range<u32>>) -> u32 {
-        out.clear();
-        // Enough for any view, so that a later one does not allocate.
-        out.reserve(self.clusters.len().div_ceil(2));
-        let mut triangles = 0;
-        let kept = self
-            .clusters
-            .iter()
-            .zip(&self.kept)
-            .filter(|(_, kept)| **kept);
-        for (cluster, _) in kept {
-            let range = cluster.triangles.clone();
-            triangles += range.len() as u32;
-            match out.last_mut() {
-                Some(last) if last.end == range.start => last.end = range.end,
-                _ => out.push(range),
+    /// Drops or keeps each cluster of a block. Returns how many were dropped because they face away.
+    fn visit_clusters(&mut self, first: Place, states: &States) -> u32 {
+        let mut away = 0;
+        for (position, &state) in self.hierarchy.lanes(first).zip(states) {
+            if state & (OUTSIDE | AWAY) == 0 {
+                self.kept.insert(self.hierarchy.cluster(position));
             }
+            away += u32::from(state & (OUTSIDE | AWAY) == AWAY);
         }
-        triangles
+        away
     }
 }
 
-/// The six functions that are not negative anywhere in the image.
-fn frustum(view: &View) -> [Linear; 6] {
-    let m = MARGIN_PX;
-    let (right, bottom) = (f64::from(view.width) + m, f64::from(view.height) + m);
-    [
-        [0.0, 0.0, -1.0, 1.0],
-        [0.0, 0.0, 1.0, 0.0],
-        [1.0, 0.0, 0.0, m],
-        [-1.0, 0.0, 0.0, right],
-        [0.0, 1.0, 0.0, m],
-        [0.0, -1.0, 0.0, bottom],
-    ]
-    .map(|weights| Linear::of_rows(&view.pixel_from_world, weights))
+/// The tests of one view.
+struct Tests {
+    /// The six functions that are not negative anywhere in the image.
+    frustum: [Linear; 6],
+    facing: Facing,
 }
 
-/// The half-spaces among `candidates` that the box is not entirely inside of, or `None` if it is entirely outside of
-/// one.
-fn crossed_by_box(planes: &[Linear; 6], aabb: &Aabb, candidates: u8) -> Option<u8> {
-    let (min, max) = (aabb.min.as_dvec3(), aabb.max.as_dvec3());
-    let (center, half) = ((min + max) * 0.5, (max - min) * 0.5);
-    let mut crossed = candidates;
-    for (bit, plane) in planes.iter().enumerate() {
-        if candidates >> bit & 1 == 0 {
-            continue;
-        }
-        let range = plane.over_box(center, half);
-        if range.max < 0.0 {
-            return None;
-        }
-        if range.min > 0.0 {
-            crossed &= !(1 << bit);
+impl Tests {
+    fn new(view: &View) -> Self {
+        let m = MARGIN_PX;
+        let (right, bottom) = (f64::from(view.width) + m, f64::from(view.height) + m);
+        let frustum = [
+            [0.0, 0.0, -1.0, 1.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [1.0, 0.0, 0.0, m],
+            [-1.0, 0.0, 0.0, right],
+            [0.0, 1.0, 0.0, m],
+            [0.0, -1.0, 0.0, bottom],
+        ]
+        .map(|weights| Linear::of_rows(&view.pixel_from_world, weights));
+        Self {
+            frustum,
+            facing: Facing::new(&view.pixel_from_world),
         }
     }
-    Some(crossed)
-}
 
-/// Whether the cluster's ball is entirely outside of one of the `candidates`.
-fn is_outside(planes: &[Linear; 6], cluster: &Cluster, candidates: u8) -> bool {
-    let center = DVec3::from(cluster.center.map(f64::from));
-    let radius = f64::from(cluster.radius);
-    planes
-        .iter()
-        .enumerate()
-        .any(|(bit, plane)| candidates >> bit & 1 == 1 && plane.over_ball(center, radius).max < 0.0)
-}
-
-/// The box about a cluster's ball, rounded outwards, if it is of reasonable size.
-fn bounding_box(cluster: &Cluster) -> Option<Aabb> {
-    let corner = |sign: f32| {
-        Vec3A::from(cluster.center.map(|c| {
-            let bound = c + sign * cluster.radius;
-            // The sum is the nearest f32, so that the next one is beyond the exact sum.
-            if sign < 0.0 {
-                bound.next_down()
-            } else {
-                bound.next_up()
+    /// What is known of the bounds in a block, of all of which `known` is. Sets are worth a closer look, because what is
+    /// found out about them need not be for their members.
+    fn states(&self, block: &Block, known: State, is_set: bool) -> States {
+        let balls = block.balls();
+        let mut states = [known & !CROSSING; LANES];
+        for (bit, plane) in self.frustum.iter().enumerate() {
+            if known >> bit & 1 == 1 {
+                cross(plane, 1 << bit, &balls, &mut states);
             }
-        }))
-    };
-    let (min, max) = (corner(-1.0), corner(1.0));
-    let reasonable = |v: Vec3A| v.is_finite() && v.abs().max_element() <= LARGEST_COORDINATE;
-    (reasonable(min) && reasonable(max)).then_some(Aabb { min, max })
+        }
+        if known & (AWAY | FRONT) == 0 && states.iter().any(|state| state & OUTSIDE == 0) {
+            if is_set && known & UNCLIPPED == 0 {
+                self.facing.find_unclipped(&balls, &mut states);
+            }
+            self.facing.test(block, &balls, &mut states);
+        }
+        states
+    }
+}
+
+/// Adds `crossing` to the states of balls that stick out of a half-space, or [`OUTSIDE`] where all of the ball does.
+fn cross(plane: &Linear, crossing: State, balls: &Balls, states: &mut States) {
+    for (i, state) in states.iter_mut().enumerate() {
+        let range = plane.over_ball(balls.center(i), balls.radius[i], balls.reach[i]);
+        let is_inside = range.min > 0.0;
+        let is_outside = range.max < 0.0;
+        *state |= if is_inside { 0 } else { crossing } | if is_outside { OUTSIDE } else { 0 };
+    }
 }
 
 #[cfg(test)]

@@ -1,13 +1,16 @@
-//! Linear functions of a world point, bounded over boxes and balls.
+//! Linear functions of a world point, bounded over balls.
 //!
 //! Clipping planes and the depth `w` are linear combinations of the rows of `pixel_from_world`, hence functions
-//! `f(p) = n . p + d` of the world point. Over the box of centre c and half-size h, f lies within `|n| . h`
-//! (componentwise) of `f(c)`; over the ball of centre c and radius r, within `|n| r`. Ranges are widened by `ROUNDING`
-//! times the sum of the magnitudes of all terms, including those that cancelled when rows were combined. That covers
-//! the rounding here as well as in what it is compared with: projecting a vertex (8 roundings), measuring its distance
-//! from the clipping planes (2) and moving it along edges by clipping (3 for each of 6 planes, every result a convex
-//! combination of vertices). So when a range over a set of triangles is negative, `f` is negative at every vertex that
-//! clipping these triangles yields, as computed.
+//! `f(p) = n . p + d` of the world point. Over the ball of centre c and radius r, f lies within `|n| r` of `f(c)`.
+//! Ranges are widened by `ROUNDING` times the sum of the magnitudes of all terms, including those that cancelled when
+//! rows were combined. That covers the rounding here as well as in what it is compared with: projecting a vertex (8
+//! roundings), measuring its distance from the clipping planes (2) and moving it along edges by clipping (3 for each
+//! of 6 planes, every result a convex combination of vertices). So when a range over a set of triangles is negative,
+//! `f` is negative at every vertex that clipping these triangles yields, as computed.
+//!
+//! With `m_k` the magnitudes of n and the ball's [`reach`](super::block::Balls) `R = |c_x| + |c_y| + |c_z| + 3 r`, the
+//! sum of the terms' magnitudes in the ball is at most `sum m_k (|c_k| + r) + m_d <= max(m_k) R + m_d`: two constants
+//! for a view.
 
 use glam::{DMat4, DVec3, DVec4};
 
@@ -22,9 +25,9 @@ pub(super) struct Linear {
     /// Its value at the origin.
     pub(super) offset: f64,
     /// Length of the gradient.
-    length: f64,
-    /// What gradient and offset would be without cancellation.
-    magnitude: DVec4,
+    pub(super) length: f64,
+    /// What rounding may change, for each unit of reach and in any case.
+    rounding: [f64; 2],
 }
 
 /// A closed interval that holds all values of a [`Linear`] function on some set. NaN compares false with everything.
@@ -43,37 +46,32 @@ impl Linear {
             sum += row;
             magnitude += row.abs();
         }
+        let steepest = magnitude.x + magnitude.y + magnitude.z;
         Self {
             gradient: sum.truncate(),
             offset: sum.w,
             length: sum.truncate().length(),
-            magnitude,
+            rounding: [ROUNDING * steepest, ROUNDING * magnitude.w],
         }
     }
 
     /// The value at `p`.
-    pub(super) fn at(&self, p: DVec3) -> f64 {
-        self.gradient.dot(p) + self.offset
+    #[inline(always)]
+    pub(super) fn at(&self, [x, y, z]: [f64; 3]) -> f64 {
+        let n = self.gradient;
+        n.x * x + n.y * y + n.z * z + self.offset
     }
 
-    /// What rounding may change at points whose components' magnitudes do not exceed those of `reach`.
-    pub(super) fn rounding(&self, reach: DVec3) -> f64 {
-        ROUNDING * (self.magnitude.truncate().dot(reach) + self.magnitude.w)
+    /// What rounding may change in a ball of that reach.
+    #[inline(always)]
+    pub(super) fn rounding(&self, reach: f64) -> f64 {
+        self.rounding[0] * reach + self.rounding[1]
     }
 
-    /// Bounds over the box of centre `center` and half-size `half`.
-    pub(super) fn over_box(&self, center: DVec3, half: DVec3) -> Interval {
-        let spread = self.gradient.abs().dot(half) + self.rounding(center.abs() + half);
-        let value = self.at(center);
-        Interval {
-            min: value - spread,
-            max: value + spread,
-        }
-    }
-
-    /// Bounds over the ball of centre `center` and radius `radius`.
-    pub(super) fn over_ball(&self, center: DVec3, radius: f64) -> Interval {
-        let spread = self.length * radius + self.rounding(center.abs() + radius);
+    /// Bounds over the ball about `center`.
+    #[inline(always)]
+    pub(super) fn over_ball(&self, center: [f64; 3], radius: f64, reach: f64) -> Interval {
+        let spread = self.length * radius + self.rounding(reach);
         let value = self.at(center);
         Interval {
             min: value - spread,

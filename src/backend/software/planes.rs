@@ -96,7 +96,10 @@ impl<S: Simd> CornerLanes<S> {
         let determinant = v0[X] * edges[0][0] + v0[Y] * edges[0][1] + v0[W] * edges[0][2];
         Self {
             points,
-            center: [load(&corners.anchor[0]) + 0.5, load(&corners.anchor[1]) + 0.5],
+            center: [
+                load(&corners.anchor[0]) + 0.5,
+                load(&corners.anchor[1]) + 0.5,
+            ],
             edges,
             determinant,
         }

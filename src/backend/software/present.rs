@@ -61,7 +61,11 @@ fn copy_tile(tile: &Tile, stride: usize, band: &mut [u8], bytes_of: impl Fn(u32)
     let left = tile.origin[0] as usize * PIXEL_BYTES;
     let width = tile.width as usize * PIXEL_BYTES;
     let (blocks, _) = tile.colour.as_chunks::<BLOCK_PIXELS>();
-    for (y, row) in band.chunks_mut(stride).enumerate().take(tile.height as usize) {
+    for (y, row) in band
+        .chunks_mut(stride)
+        .enumerate()
+        .take(tile.height as usize)
+    {
         // The same row of each block; blocks follow each other.
         let first = y % BLOCK_SIDE * BLOCK_SIDE;
         let blocks = &blocks[y / BLOCK_SIDE * BLOCKS_ACROSS..];

@@ -20,8 +20,8 @@
 use super::setup::Piece;
 use super::shares::{Share, add_pixels};
 use super::tile::{
-    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, BlockSet, NO_DEPTH, NO_TRIANGLE, TILE_BLOCKS, TILE_PIXELS,
-    TILE_SIDE, Tile,
+    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, BlockSet, NO_DEPTH, NO_TRIANGLE, TILE_BLOCKS,
+    TILE_PIXELS, TILE_SIDE, Tile,
 };
 use crate::geometry::screen::{DepthPlane, EdgeFunction, SUBPIXEL_BITS};
 use crate::simd::Simd;
@@ -50,15 +50,18 @@ pub(super) fn draw_tile<S: Simd>(simd: S, tile: &mut Tile, index: usize, shares:
         return;
     }
     let mut canvas = Canvas {
-        depth: [0.0; TILE_PIXELS],
+        depth: [NO_DEPTH; TILE_PIXELS],
+        slot: [NO_TRIANGLE; TILE_PIXELS],
         farthest: [NO_DEPTH; TILE_BLOCKS],
+        owned: BlockSet::default(),
+        origin: tile.origin,
+        size: [tile.width, tile.height],
         lanes: Lanes::new(simd),
-        tile,
     };
     for piece in pieces {
         canvas.draw(simd, piece);
     }
-    count_owners(simd, tile, shares);
+    hand_over(simd, &canvas, tile, shares);
 }
 
 /// Columns and rows of a block's pixels, from its corner, a vector for each part of the block.
@@ -140,30 +143,30 @@ struct TileEdges {
 
 impl TileEdges {
     #[inline(always)]
-    fn new(piece: &Piece, tile: &Tile) -> Self {
+    fn new(piece: &Piece, origin: [i32; 2], size: [i32; 2]) -> Self {
         let mut edges = [TileEdge::default(); MOST_EDGES];
         for i in 0..3 {
             let edge = EdgeFunction::new(piece.corners[i], piece.corners[(i + 1) % 3]);
             edges[i] = TileEdge {
-                origin: edge.at_pixel(tile.origin[0], tile.origin[1]) >> SUBPIXEL_BITS,
+                origin: edge.at_pixel(origin[0], origin[1]) >> SUBPIXEL_BITS,
                 dx: edge.a as i32,
                 dy: edge.b as i32,
             };
         }
         // The borders of the image, which would not stop a block.
         edges[3] = TileEdge {
-            origin: i64::from(tile.width) - 1,
+            origin: i64::from(size[0]) - 1,
             dx: -1,
             dy: 0,
         };
         edges[4] = TileEdge {
-            origin: i64::from(tile.height) - 1,
+            origin: i64::from(size[1]) - 1,
             dx: 0,
             dy: -1,
         };
         Self {
             edges,
-            count: if is_inner(tile) { 3 } else { MOST_EDGES },
+            count: if is_inner(size) { 3 } else { MOST_EDGES },
         }
     }
 
@@ -203,10 +206,10 @@ struct BlockEdges {
     count: usize,
 }
 
-/// Whether no pixel of the tile is outside of the image.
+/// Whether no pixel of a tile is outside of the image, given how many columns and rows are inside.
 #[inline(always)]
-fn is_inner(tile: &Tile) -> bool {
-    tile.width == TILE_SIDE as i32 && tile.height == TILE_SIDE as i32
+fn is_inner(size: [i32; 2]) -> bool {
+    size == [TILE_SIDE as i32; 2]
 }
 
 /// The edges of a small piece in the blocks from that on whose first pixel is `(x, y)` of the image; `None` if it is not small.
@@ -251,7 +254,13 @@ struct Brush<S: Simd, const N: usize> {
 
 impl<S: Simd, const N: usize> Brush<S, N> {
     #[inline(always)]
-    fn new(simd: S, lanes: &Lanes<S>, piece: &Piece, edges: [BlockEdge; N], origin: [i32; 2]) -> Self {
+    fn new(
+        simd: S,
+        lanes: &Lanes<S>,
+        piece: &Piece,
+        edges: [BlockEdge; N],
+        origin: [i32; 2],
+    ) -> Self {
         let mut inside_block = [[S::i32s::splat(simd, 0); MOST_PARTS]; N];
         for k in 0..N {
             for part in 0..Lanes::<S>::parts() {
@@ -318,6 +327,21 @@ impl<S: Simd, const N: usize> Brush<S, N> {
         ranges
     }
 
+    /// Which pixels of a block violate no edge, given the values at its first pixel.
+    #[inline(always)]
+    fn inside(&self, simd: S, corner: &[i32; N]) -> [S::mask32s; MOST_PARTS] {
+        let zero = S::i32s::splat(simd, 0);
+        let mut inside = [S::mask32s::splat(simd, true); MOST_PARTS];
+        for part in 0..Lanes::<S>::parts() {
+            let mut signs = zero;
+            for k in 0..N {
+                signs |= self.inside_block[k][part] + corner[k];
+            }
+            inside[part] = signs.simd_ge(zero);
+        }
+        inside
+    }
+
     /// For a vector of blocks of a row, the first of them `right` pixels to the right of where the edges have the given
     /// values: which have a pixel that violates no edge as far as the corners tell, and which have no other.
     #[inline(always)]
@@ -336,20 +360,28 @@ impl<S: Simd, const N: usize> Brush<S, N> {
     }
 }
 
-/// A tile that is being drawn.
-struct Canvas<'a, S: Simd> {
-    tile: &'a mut Tile,
-    /// Reversed depth of each pixel of an owned block, or [`NO_DEPTH`].
+/// A tile that is being drawn, on the stack of the thread that draws it and in its caches: waiting for the tile's own memory
+/// would take longer than drawing.
+struct Canvas<S: Simd> {
+    /// Reversed depth of each pixel, or [`NO_DEPTH`].
     depth: [f32; TILE_PIXELS],
+    /// The slot of the triangle that owns each pixel, or [`NO_TRIANGLE`].
+    slot: [u32; TILE_PIXELS],
     /// A depth that no pixel of a block is farther than.
     farthest: [f32; TILE_BLOCKS],
+    /// Blocks in which some pixel has a triangle.
+    owned: BlockSet,
+    /// The image pixel in the top left corner.
+    origin: [i32; 2],
+    /// Columns and rows inside the image.
+    size: [i32; 2],
     lanes: Lanes<S>,
 }
 
-impl<S: Simd> Canvas<'_, S> {
+impl<S: Simd> Canvas<S> {
     #[inline(always)]
     fn draw(&mut self, simd: S, piece: &Piece) {
-        let pixels = piece.bounds.within(self.tile.origin);
+        let pixels = piece.bounds.within(self.origin);
         let block = |pixel: i32| pixel as usize / BLOCK_SIDE;
         let range = BlockRange {
             x0: block(pixels.x0),
@@ -358,15 +390,15 @@ impl<S: Simd> Canvas<'_, S> {
             y1: block(pixels.y1),
         };
         let is_small = range.x1 - range.x0 < SMALL_BLOCKS && range.y1 - range.y0 < SMALL_BLOCKS;
-        if is_small && is_inner(self.tile) {
+        if is_small && is_inner(self.size) {
             let [left, top] = [range.x0, range.y0].map(|block| (block * BLOCK_SIDE) as i32);
-            let first = [self.tile.origin[0] + left, self.tile.origin[1] + top];
+            let first = [self.origin[0] + left, self.origin[1] + top];
             if let Some(edges) = small_edges(piece, first) {
                 self.draw_each(simd, piece, edges, range);
                 return;
             }
         }
-        let Some(crossing) = TileEdges::new(piece, self.tile).crossing(range) else {
+        let Some(crossing) = TileEdges::new(piece, self.origin, self.size).crossing(range) else {
             return;
         };
         let all = &crossing.edges;
@@ -383,7 +415,7 @@ impl<S: Simd> Canvas<'_, S> {
     /// lanes and stepped.
     #[inline(always)]
     fn draw_each(&mut self, simd: S, piece: &Piece, edges: [BlockEdge; 3], range: BlockRange) {
-        let brush = Brush::new(simd, &self.lanes, piece, edges, self.tile.origin);
+        let brush = Brush::new(simd, &self.lanes, piece, edges, self.origin);
         let (side, parts) = (BLOCK_SIDE as i32, Lanes::<S>::parts());
         let zero = S::i32s::splat(simd, 0);
         let mut row_values = brush.inside_block;
@@ -396,7 +428,7 @@ impl<S: Simd> Canvas<'_, S> {
         }
         for y in range.y0..=range.y1 {
             let row_depths = brush.row_depths(simd, &self.lanes, y);
-            let mut owned = self.tile.owned.row(y);
+            let mut owned = self.owned.row(y);
             let (mut values, mut columns) = (row_values, columns);
             for x in range.x0..=range.x1 {
                 let mut inside = [S::mask32s::splat(simd, true); MOST_PARTS];
@@ -413,7 +445,7 @@ impl<S: Simd> Canvas<'_, S> {
                 }
                 self.put(simd, brush.slot, [x, y], inside, depths, &mut owned);
             }
-            self.tile.owned.insert_row(y, owned);
+            self.owned.insert_row(y, owned);
             for k in 0..3 {
                 for part in 0..parts {
                     row_values[k][part] += edges[k].dy * side;
@@ -432,7 +464,7 @@ impl<S: Simd> Canvas<'_, S> {
         range: BlockRange,
     ) {
         let (width, side) = (S::i32s::LEN, BLOCK_SIDE as i32);
-        let brush = Brush::new(simd, &self.lanes, piece, edges, self.tile.origin);
+        let brush = Brush::new(simd, &self.lanes, piece, edges, self.origin);
         for y in range.y0..=range.y1 {
             let row_depths = brush.row_depths(simd, &self.lanes, y);
             let below = (y - range.y0) as i32 * side;
@@ -447,16 +479,18 @@ impl<S: Simd> Canvas<'_, S> {
                 let at = y * BLOCKS_ACROSS + first;
                 let farthest = S::f32s::from_slice(simd, &self.farthest[at..at + width]);
                 // What is nowhere strictly nearer loses.
-                let mut left =
+                let drawn =
                     (some & most.simd_gt(farthest)).to_bitmask() & range.columns_from(first);
-                let full = all.to_bitmask() & left;
+                let full = all.to_bitmask() & drawn;
                 if full != 0 {
                     let filled = S::mask32s::from_bitmask(simd, full);
                     filled
                         .select(least.max(farthest), farthest)
                         .store_slice(&mut self.farthest[at..at + width]);
                 }
-                let mut owned = self.tile.owned.row(y);
+                let mut owned = self.owned.row(y);
+                // One kind after the other, so that branches can be predicted.
+                let mut left = drawn & !full;
                 while left != 0 {
                     let bit = left.trailing_zeros() as usize;
                     left &= left - 1;
@@ -465,48 +499,43 @@ impl<S: Simd> Canvas<'_, S> {
                         corner[k] += (right + bit as i32 * side).wrapping_mul(edges[k].dx);
                     }
                     let place = [first + bit, y];
-                    let (rows, corner) = (&row_depths, &corner);
-                    if full >> bit & 1 == 1 {
-                        self.draw_block::<N, true>(simd, &brush, rows, place, corner, &mut owned);
-                    } else {
-                        self.draw_block::<N, false>(simd, &brush, rows, place, corner, &mut owned);
-                    }
+                    let inside = brush.inside(simd, &corner);
+                    self.draw_block(simd, &brush, &row_depths, place, inside, &mut owned);
                 }
-                self.tile.owned.insert_row(y, owned);
+                let mut left = full;
+                while left != 0 {
+                    let bit = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    let place = [first + bit, y];
+                    let inside = [S::mask32s::splat(simd, true); MOST_PARTS];
+                    self.draw_block(simd, &brush, &row_depths, place, inside, &mut owned);
+                }
+                self.owned.insert_row(y, owned);
             }
         }
     }
 
-    /// Draws a block's pixels: all of them, or those that violate no edge, whose values at the first pixel are given.
+    /// Draws a block's pixels that are inside of the triangle.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "the innermost of three loops")]
-    fn draw_block<const N: usize, const IS_FULL: bool>(
+    fn draw_block<const N: usize>(
         &mut self,
         simd: S,
         brush: &Brush<S, N>,
         row_depths: &[S::f32s; MOST_PARTS],
         [x, y]: [usize; 2],
-        corner: &[i32; N],
+        inside: [S::mask32s; MOST_PARTS],
         owned: &mut u64,
     ) {
-        let mut inside = [S::mask32s::splat(simd, true); MOST_PARTS];
         let mut depths = *row_depths;
         for part in 0..Lanes::<S>::parts() {
             let column: S::f32s = (self.lanes.column[part] + brush.column(x)).to_float();
             depths[part] = brush.depths(simd, row_depths[part], column);
-            if !IS_FULL {
-                let mut signs = S::i32s::splat(simd, 0);
-                for k in 0..N {
-                    signs |= brush.inside_block[k][part] + corner[k];
-                }
-                inside[part] = signs.simd_ge(S::i32s::splat(simd, 0));
-            }
         }
         self.put(simd, brush.slot, [x, y], inside, depths, owned);
     }
 
-    /// Gives a triangle those of a block's pixels that are inside of it and where it is nearest. `owned`
-    /// has a bit for each block of the row in which some pixel has a triangle: what the others hold is from an older image.
+    /// Gives a triangle those of a block's pixels that are inside of it and where it is nearest, and sets the block's bit in the
+    /// row's if there are any. Without a branch: whether there are cannot be predicted on a fine mesh.
     #[inline(always)]
     fn put(
         &mut self,
@@ -519,47 +548,35 @@ impl<S: Simd> Canvas<'_, S> {
     ) {
         let width = S::i32s::LEN;
         let first = (y * BLOCKS_ACROSS + x) * BLOCK_PIXELS;
-        // Without branches: whether a block of a fine mesh is the first to be drawn into is hard to predict.
-        let known = S::mask32s::splat(simd, *owned >> x & 1 == 1);
-        let nothing = S::f32s::splat(simd, NO_DEPTH);
-        let nobody = S::u32s::splat(simd, NO_TRIANGLE);
-        let (mut wins, mut stored) = (inside, depths);
-        let mut any = false;
+        let mut any = 0;
         for part in 0..Lanes::<S>::parts() {
             let at = first + part * width;
-            let depth = S::f32s::from_slice(simd, &self.depth[at..at + width]);
-            stored[part] = known.select(depth, nothing);
-            wins[part] &= depths[part].simd_gt(stored[part]);
-            any |= wins[part].any_true();
+            let depth = &mut self.depth[at..at + width];
+            let owner = &mut self.slot[at..at + width];
+            let stored = S::f32s::from_slice(simd, depth);
+            let wins = inside[part] & depths[part].simd_gt(stored);
+            wins.select(depths[part], stored).store_slice(depth);
+            let old = S::u32s::from_slice(simd, owner);
+            wins.select(slot, old).store_slice(owner);
+            any |= u64::from(wins.any_true());
         }
-        if !any {
-            return;
-        }
-        *owned |= 1 << x;
-        for part in 0..Lanes::<S>::parts() {
-            let at = first + part * width;
-            let stored_slot = &mut self.tile.slot[at..at + width];
-            let owner = known.select(S::u32s::from_slice(simd, stored_slot), nobody);
-            wins[part].select(slot, owner).store_slice(stored_slot);
-            wins[part]
-                .select(depths[part], stored[part])
-                .store_slice(&mut self.depth[at..at + width]);
-        }
+        *owned |= any << x;
     }
 }
 
-/// Counts the covered pixels, and those of each triangle.
+/// Copies the owned blocks to the tile, and counts the covered pixels and those of each triangle.
 #[inline(always)]
-fn count_owners<S: Simd>(simd: S, tile: &mut Tile, shares: &[Share]) {
+fn hand_over<S: Simd>(simd: S, canvas: &Canvas<S>, tile: &mut Tile, shares: &[Share]) {
     let width = S::u32s::LEN;
     let mut covered = 0;
     // A large triangle fills block after block.
     let (mut last, mut count) = (NO_TRIANGLE, 0);
-    for block in tile.owned.iter() {
+    for block in canvas.owned.iter() {
         for part in 0..BLOCK_PIXELS / width {
             let at = block * BLOCK_PIXELS + part * width;
-            let slots = &tile.slot[at..at + width];
+            let slots = &canvas.slot[at..at + width];
             let vector = S::u32s::from_slice(simd, slots);
+            vector.store_slice(&mut tile.slot[at..at + width]);
             let mut left = vector.simd_ne(NO_TRIANGLE).to_bitmask();
             covered += left.count_ones();
             while left != 0 {
@@ -580,4 +597,5 @@ fn count_owners<S: Simd>(simd: S, tile: &mut Tile, shares: &[Share]) {
         add_pixels(shares, last, count);
     }
     tile.covered = covered;
+    tile.owned = canvas.owned;
 }

@@ -1,7 +1,7 @@
 //! Triangle set-up: culling, clipping, and what the tiles need to draw and to colour a triangle; then binning.
 //!
 //! A triangle is dropped when all its corners are outside of one clipping plane, when its snapped area says that it faces
-//! away, or when no pixel centre lies in its box. That is found out for a batch of consecutive triangles at a time; the planes of
+//! away, or when no pixel centre lies in its box, or in itself if the box holds few. That is found out for a batch of consecutive triangles at a time; the planes of
 //! those left are worked out several at a time (see [`planes`](super::planes)).
 //!
 //! A triangle with a corner outside of some plane is clipped and becomes a
@@ -24,6 +24,11 @@ use crate::geometry::screen::{
 use crate::math::PixelPoint;
 use crate::simd::Simd;
 use fearless_simd::prelude::*;
+
+/// Boxes of fewer pixel centres than this along both axes are tested pixel by pixel: many such triangles lie between pixels.
+const TINY: i32 = 2;
+/// In sub-pixels, no such box is larger unless the image's border has cut it.
+const TINY_EXTENT: i32 = (TINY + 1) << SUBPIXEL_BITS;
 
 /// Triangles looked at together.
 const BATCH: usize = 16;
@@ -181,7 +186,13 @@ impl Batch {
 
     /// What becomes of a vector's worth of triangles from `at` on, and the boxes of those that are drawn.
     #[inline(always)]
-    fn judge<S: Simd>(&self, simd: S, grid: Grid, at: usize, boxes: &mut [PixelRanges; 2]) -> Verdicts {
+    fn judge<S: Simd>(
+        &self,
+        simd: S,
+        grid: Grid,
+        at: usize,
+        boxes: &mut [PixelRanges; 2],
+    ) -> Verdicts {
         let end = at + S::i32s::LEN;
         let load = |from: &[i32; BATCH]| S::i32s::from_slice(simd, &from[at..end]);
         let zero = S::i32s::splat(simd, 0);
@@ -191,9 +202,11 @@ impl Batch {
         let x = [load(&self.x[0]), load(&self.x[1]), load(&self.x[2])];
         let y = [load(&self.y[0]), load(&self.y[1]), load(&self.y[2])];
         let [front, back] = self.facing(simd, at, &x, &y);
-        let [x0, x1] = pixel_range(simd, x, grid.width);
-        let [y0, y1] = pixel_range(simd, y, grid.height);
-        let has_pixels = x0.simd_le(x1) & y0.simd_le(y1);
+        let [x0, x1, across] = pixel_range(simd, x, grid.width);
+        let [y0, y1, down] = pixel_range(simd, y, grid.height);
+        let mut has_pixels = x0.simd_le(x1) & y0.simd_le(y1);
+        let is_tiny = (x1 - x0).max(y1 - y0).simd_lt(TINY) & across.max(down).simd_lt(TINY_EXTENT);
+        has_pixels &= !is_tiny | covers_some_of_four(simd, &x, &y, [x0, y0]);
         for (ranges, [first, last]) in boxes.iter_mut().zip([[x0, x1], [y0, y1]]) {
             first.store_slice(&mut ranges.first[at..end]);
             last.store_slice(&mut ranges.last[at..end]);
@@ -231,16 +244,53 @@ impl Batch {
     }
 }
 
-/// First and last pixel along an axis of `size` pixels whose centres lie in the triangles' boxes, as
-/// [`PixelBox::of_snapped`] has them.
+/// Whether triangles that turn their front to the viewer, and whose boxes hold the centres of at most 2 x 2 pixels, the first of
+/// which is given, cover any of those. It is [`EdgeFunction`](crate::geometry::screen::EdgeFunction) at four places. Such boxes
+/// are below three pixels, so that values are below `2^21`. Pixels outside of the box are not covered either, and do no harm.
 #[inline(always)]
-fn pixel_range<S: Simd>(simd: S, v: [S::i32s; 3], size: u32) -> [S::i32s; 2] {
+fn covers_some_of_four<S: Simd>(
+    simd: S,
+    x: &[S::i32s; 3],
+    y: &[S::i32s; 3],
+    first: [S::i32s; 2],
+) -> S::mask32s {
+    let half = 1 << (SUBPIXEL_BITS - 1);
+    let [left, top] = [
+        (first[0] << SUBPIXEL_BITS) + half,
+        (first[1] << SUBPIXEL_BITS) + half,
+    ];
+    let (zero, one) = (S::i32s::splat(simd, 0), S::i32s::splat(simd, 1));
+    // Or-ed together, at the four pixels: negative where one of the edges is violated.
+    let mut signs = [zero; 4];
+    for i in 0..3 {
+        let next = (i + 1) % 3;
+        let (dx, dy) = (x[next] - x[i], y[next] - y[i]);
+        let top_left = dy.simd_gt(zero) | (dy.simd_eq(zero) & dx.simd_lt(zero));
+        let bias = top_left.select(zero, one);
+        let value = dy * (left - x[i]) - dx * (top - y[i]) - bias;
+        let (right, below) = (dy << SUBPIXEL_BITS, dx << SUBPIXEL_BITS);
+        signs[0] |= value;
+        signs[1] |= value + right;
+        signs[2] |= value - below;
+        signs[3] |= value + right - below;
+    }
+    signs[0].simd_ge(zero)
+        | signs[1].simd_ge(zero)
+        | signs[2].simd_ge(zero)
+        | signs[3].simd_ge(zero)
+}
+
+/// First and last pixel along an axis of `size` pixels whose centres lie in the triangles' boxes, as
+/// [`PixelBox::of_snapped`] has them; and the boxes' extents in sub-pixels.
+#[inline(always)]
+fn pixel_range<S: Simd>(simd: S, v: [S::i32s; 3], size: u32) -> [S::i32s; 3] {
     let half = 1 << (SUBPIXEL_BITS - 1);
     let min = v[0].min(v[1]).min(v[2]);
     let max = v[0].max(v[1]).max(v[2]);
     [
         ((min + (half - 1)) >> SUBPIXEL_BITS).max(S::i32s::splat(simd, 0)),
         ((max - half) >> SUBPIXEL_BITS).min(S::i32s::splat(simd, size as i32 - 1)),
+        max - min,
     ]
 }
 

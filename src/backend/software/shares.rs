@@ -107,7 +107,11 @@ impl Share {
         let (triangles, pieces) = (self.drawn.len(), self.pieces.len());
         self.drawn.resize(triangles + count, Drawn::default());
         self.pieces.resize(pieces + count, Piece::default());
-        (slot, &mut self.drawn[triangles..], &mut self.pieces[pieces..])
+        (
+            slot,
+            &mut self.drawn[triangles..],
+            &mut self.pieces[pieces..],
+        )
     }
 
     /// Begins to count the pixels of the next triangle, which may have those in `bounds`.

@@ -47,7 +47,8 @@ impl Vertices {
     /// Transforms the vertices of all triangles in `shares`.
     pub(super) fn transform(&mut self, exec: Exec, geometry: Geometry<'_>, shares: &mut [Share]) {
         let count = geometry.world.positions.len().div_ceil(BLOCK);
-        self.snapped.resize(count, [SnappedVertex::default(); BLOCK]);
+        self.snapped
+            .resize(count, [SnappedVertex::default(); BLOCK]);
         self.points.resize(count, [[0.0; 4]; BLOCK]);
         self.wanted.resize_with(count, AtomicBool::default);
         let wanted = &self.wanted;
@@ -108,7 +109,11 @@ fn transform_block<S: Simd>(
         }
         out
     };
-    let position = [widen(&positions.x), widen(&positions.y), widen(&positions.z)];
+    let position = [
+        widen(&positions.x),
+        widen(&positions.y),
+        widen(&positions.z),
+    ];
     let mut point = [[0.0; BLOCK]; 4];
     let mut grid = [[0.0; BLOCK]; 2];
     let mut inside = true;
