@@ -142,6 +142,41 @@ impl SoftwareBackend {
         }
     }
 
+    /// The first step of [`rasterize`](Backend::rasterize), public for benchmarks only, as are the others: makes room for the
+    /// image, cuts triangles into shares, and transforms their vertices.
+    #[doc(hidden)]
+    pub fn transform(&mut self, exec: Exec, geometry: Geometry<'_>) {
+        self.fit(geometry);
+        self.shares.cut(geometry);
+        self.vertices
+            .transform(exec, geometry, self.shares.used_mut());
+    }
+
+    /// The second step: what there is to draw, sorted into tiles.
+    #[doc(hidden)]
+    pub fn set_up(&mut self, exec: Exec, geometry: Geometry<'_>) {
+        let (grid, vertices) = (self.grid, &self.vertices);
+        exec.for_each_chunk(self.shares.used_mut(), 1, |_, share| {
+            dispatch!(exec.level, simd => setup::set_up(simd, &mut share[0], geometry, grid, vertices));
+        });
+    }
+
+    /// The third step: who owns which pixel.
+    #[doc(hidden)]
+    pub fn draw(&mut self, exec: Exec) {
+        let shares = self.shares.used();
+        exec.for_each_chunk(&mut self.tiles, 1, |index, tile| {
+            dispatch!(exec.level, simd => raster::draw_tile(simd, &mut tile[0], index, shares));
+        });
+    }
+
+    /// The last step: who owns any.
+    #[doc(hidden)]
+    pub fn list_owners(&mut self, exec: Exec, geometry: Geometry<'_>) {
+        let triangles = geometry.world.triangles.len();
+        self.visible.list(exec, &mut self.shares, triangles);
+    }
+
     fn counts(&self) -> RasterCounts {
         let mut counts = RasterCounts::default();
         for share in self.shares.used() {
@@ -169,21 +204,10 @@ impl Backend for SoftwareBackend {
     }
 
     fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts {
-        self.fit(geometry);
-        let grid = self.grid;
-        self.shares.cut(geometry);
-        self.vertices
-            .transform(exec, geometry, self.shares.used_mut());
-        let vertices = &self.vertices;
-        exec.for_each_chunk(self.shares.used_mut(), 1, |_, share| {
-            dispatch!(exec.level, simd => setup::set_up(simd, &mut share[0], geometry, grid, vertices));
-        });
-        let shares = self.shares.used();
-        exec.for_each_chunk(&mut self.tiles, 1, |index, tile| {
-            dispatch!(exec.level, simd => raster::draw_tile(simd, &mut tile[0], index, shares));
-        });
-        self.visible
-            .list(exec, &mut self.shares, geometry.world.triangles.len());
+        self.transform(exec, geometry);
+        self.set_up(exec, geometry);
+        self.draw(exec);
+        self.list_owners(exec, geometry);
         self.counts()
     }
 
