@@ -22,6 +22,12 @@ impl Exec {
         }
     }
 
+    /// The same on the caller's thread alone.
+    #[must_use]
+    pub fn on_one_thread(self) -> Self {
+        Self { threads: 1, ..self }
+    }
+
     /// Runs `f(index, chunk)` for every chunk of `size` elements, in parallel if there are threads for it.
     pub fn for_each_chunk<T: Send>(
         &self,

@@ -1,10 +1,12 @@
 //! Rendering into memory, pools and threads of the caller.
 
+use specula::frame::Outcome;
 use specula::geometry::screen::MAX_IMAGE_SIDE;
 use specula::output::{ChannelOrder, Target};
 use specula::scene::Camera;
-use specula::{BackendKind, Budget, Engine, EngineOptions, Frame, Method, Scene};
-use std::sync::Arc;
+use specula::{BackendKind, Budget, Engine, EngineOptions, Frame, FrameStats, Method, Scene};
+use std::sync::{Arc, Barrier, mpsc};
+use std::time::Duration;
 
 const WIDTH: u32 = 150;
 const HEIGHT: u32 = 100;
@@ -230,5 +232,69 @@ fn a_frame_that_is_too_large_is_left_alone_by_every_backend() {
             let is_untouched = frame.pixels().iter().all(|&pixel| pixel == [1, 2, 3, 4]);
             assert_eq!(is_untouched, !is_drawn, "{backend}, {width}x{height}");
         }
+    }
+}
+
+/// What `render` does while all threads of its pool are busy with something else; `None` if it waits for them.
+fn while_the_pool_is_busy(
+    pool: &Arc<rayon::ThreadPool>,
+    render: impl FnOnce() -> FrameStats + Send + 'static,
+) -> Option<FrameStats> {
+    let threads = pool.current_num_threads();
+    // Everybody but the pool's threads has to say when they may go on.
+    let all_busy = Arc::new(Barrier::new(threads + 1));
+    let go_on = Arc::new(Barrier::new(threads + 1));
+    for _ in 0..threads {
+        let (all_busy, go_on) = (Arc::clone(&all_busy), Arc::clone(&go_on));
+        pool.spawn(move || {
+            all_busy.wait();
+            go_on.wait();
+        });
+    }
+    all_busy.wait();
+    let (send, receive) = mpsc::channel();
+    let thread = std::thread::spawn(move || send.send(render()));
+    // Long enough for any machine; it is waited for only when the test fails.
+    let stats = receive.recv_timeout(Duration::from_secs(20)).ok();
+    go_on.wait();
+    let _ = thread.join();
+    stats
+}
+
+#[test]
+fn frames_with_nothing_to_share_do_not_wait_for_the_pool() {
+    let scene = scene();
+    for (method, size) in [
+        (Method::Gouraud, [400, 300]),
+        (Method::Adaptive, [400, 300]),
+        // So small that even drawing it is not shared.
+        (Method::Gouraud, [32, 32]),
+    ] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+        let pool = Arc::new(pool.expect("a pool"));
+        let options = EngineOptions {
+            method,
+            pool: Some(Arc::clone(&pool)),
+            ..EngineOptions::default()
+        };
+        let mut engine = engine(&scene, options);
+        let mut frame = Frame::new(size[0], size[1]);
+        let is_tiny = size == [32, 32];
+        if !is_tiny {
+            while !engine
+                .render(&scene, Budget::Unlimited, &mut frame)
+                .converged
+            {}
+            engine.render(&scene, Budget::Unlimited, &mut frame);
+        }
+        let scene = scene.clone();
+        let render = move || engine.render(&scene, Budget::Unlimited, &mut frame);
+        let stats = while_the_pool_is_busy(&pool, render).expect("no thread of the pool is needed");
+        let want = if is_tiny {
+            Outcome::Complete
+        } else {
+            Outcome::Unchanged
+        };
+        assert_eq!(stats.outcome, want, "{method} {size:?}");
     }
 }

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-pub const USAGE: &str = "\
+pub(super) const USAGE: &str = "\
 usage: cargo bench --bench peers -- [OPTIONS]
 
-  --peers DIR         where benches/peers/setup.sh has put the peers; without, only our own frames are timed
+  --peers DIR         where benches/peers/setup.sh has put the peers and the meshes              [.]
   --meshes N,N        teapots of 56 N x N triangles, N being 4, 8, 32 or 128   [4,32,128]
   --sizes WxH,WxH     image sizes                                              [512x512,1920x1080,3840x2160]
   --shading S,S       gouraud or phong, and the number of lights               [gouraud4,phong4,phong16]
@@ -13,42 +13,42 @@ usage: cargo bench --bench peers -- [OPTIONS]
   --rounds N          turns of each cell                                       [5]
   --simd LEVEL        our SIMD level                                           [the machine's strongest]
   --csv FILE          writes the rows there, as they are measured
-  --images DIR        writes a view of each cell, as both programs draw it, as PPM
   --alone             our own frames only
+  --engine            one thread against --threads, frames without a change, triangles that are not seen
   --test              one small cell, without peers";
 
 /// How pixels get their colours, and from how many lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shading {
-    pub is_phong: bool,
-    pub lights: usize,
+pub(super) struct Shading {
+    pub(super) is_phong: bool,
+    pub(super) lights: usize,
 }
 
 impl Shading {
-    pub fn mode(self) -> &'static str {
+    pub(super) fn mode(self) -> &'static str {
         if self.is_phong { "phong" } else { "gouraud" }
     }
 }
 
 /// What was asked for.
 #[derive(Clone, Debug)]
-pub struct Arguments {
-    pub peers: Option<PathBuf>,
-    pub meshes: Vec<u32>,
-    pub sizes: Vec<[u32; 2]>,
-    pub shadings: Vec<Shading>,
-    pub threads: usize,
-    pub rounds: usize,
-    pub simd: Option<specula::simd::SimdLevel>,
-    pub csv: Option<PathBuf>,
-    pub images: Option<PathBuf>,
-    pub is_alone: bool,
-    pub is_test: bool,
+pub(super) struct Arguments {
+    pub(super) peers: Option<PathBuf>,
+    pub(super) meshes: Vec<u32>,
+    pub(super) sizes: Vec<[u32; 2]>,
+    pub(super) shadings: Vec<Shading>,
+    pub(super) threads: usize,
+    pub(super) rounds: usize,
+    pub(super) simd: Option<specula::simd::SimdLevel>,
+    pub(super) csv: Option<PathBuf>,
+    pub(super) is_alone: bool,
+    pub(super) is_engine_only: bool,
+    pub(super) is_test: bool,
 }
 
 impl Arguments {
     /// Those of this process, or what is wrong with them.
-    pub fn parse() -> Result<Self, String> {
+    pub(super) fn parse() -> Result<Self, String> {
         let mut parsed = Self {
             peers: None,
             meshes: vec![4, 32, 128],
@@ -71,8 +71,8 @@ impl Arguments {
             rounds: 5,
             simd: None,
             csv: None,
-            images: None,
             is_alone: false,
+            is_engine_only: false,
             is_test: false,
         };
         let mut arguments = std::env::args().skip(1);
@@ -81,12 +81,8 @@ impl Arguments {
             if name == "--bench" {
                 continue;
             }
-            if name == "--test" {
-                parsed.is_test = true;
-                continue;
-            }
-            if name == "--alone" {
-                parsed.is_alone = true;
+            if let Some(flag) = parsed.flag(&name) {
+                *flag = true;
                 continue;
             }
             if name == "--help" || name == "-h" {
@@ -100,13 +96,12 @@ impl Arguments {
             match name.as_str() {
                 "--peers" => parsed.peers = Some(value.into()),
                 "--csv" => parsed.csv = Some(value.into()),
-                "--images" => parsed.images = Some(value.into()),
                 "--simd" => parsed.simd = Some(value.parse().map_err(|error: String| bad(&error))?),
                 "--threads" => {
-                    parsed.threads = number(&value).ok_or_else(|| bad("not a number from 1 up"))?
+                    parsed.threads = number(&value).ok_or_else(|| bad("not a number from 1 up"))?;
                 }
                 "--rounds" => {
-                    parsed.rounds = number(&value).ok_or_else(|| bad("not a number from 1 up"))?
+                    parsed.rounds = number(&value).ok_or_else(|| bad("not a number from 1 up"))?;
                 }
                 "--meshes" => {
                     let meshes = list()
@@ -127,6 +122,16 @@ impl Arguments {
             }
         }
         Ok(parsed)
+    }
+
+    /// The option without a value that has this name.
+    fn flag(&mut self, name: &str) -> Option<&mut bool> {
+        match name {
+            "--alone" => Some(&mut self.is_alone),
+            "--engine" => Some(&mut self.is_engine_only),
+            "--test" => Some(&mut self.is_test),
+            _ => None,
+        }
     }
 }
 

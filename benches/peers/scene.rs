@@ -13,10 +13,19 @@ use std::sync::Arc;
 /// Specular exponent of all comparisons, the peers' own default.
 const SHININESS: f64 = 50.0;
 
+/// Why triangles are not seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Unseen {
+    OffScreen,
+    FacingAway,
+}
+
 /// A mesh about which the peers' cameras and lights are arranged.
 #[derive(Debug)]
-pub struct Model {
+pub(super) struct Model {
     mesh: Arc<Mesh>,
+    /// What there is besides, and cannot be seen.
+    unseen: Vec<Object>,
     /// The middle of its bounding box.
     center: DVec3,
     /// Largest distance of a vertex from there.
@@ -26,7 +35,7 @@ pub struct Model {
 impl Model {
     /// Reads what `make_mesh.py` writes: counts of vertices and triangles, positions and normals in turn, indices; all
     /// little endian, 32 bits each.
-    pub fn load(path: &Path) -> Result<Self, Error> {
+    pub(super) fn load(path: &Path) -> Result<Self, Error> {
         let bytes = std::fs::read(path)?;
         let (words, _) = bytes.as_chunks::<4>();
         let bad = |what: &str| {
@@ -59,7 +68,7 @@ impl Model {
     }
 
     /// Our own teapot of 896 triangles, for a test without the peers.
-    pub fn teapot() -> Self {
+    pub(super) fn teapot() -> Self {
         Self::new(shapes::teapot(4, false))
     }
 
@@ -76,13 +85,46 @@ impl Model {
             .fold(0.0, f64::max);
         Self {
             mesh: Arc::new(mesh),
+            unseen: Vec::new(),
             center,
             radius,
         }
     }
 
+    /// The same with `times` as many triangles more that no view sees.
+    pub(super) fn with_unseen(&self, unseen: Unseen, times: usize) -> Self {
+        let object = |mesh, offset: DVec3, turn| Object {
+            mesh,
+            material: 0,
+            author_from_mesh: DMat4::from_translation(offset) * turn,
+        };
+        let objects = match unseen {
+            // Far below: cameras look down, but not so steeply.
+            Unseen::OffScreen => (0..times)
+                .map(|i| DVec3::new(0.0, 0.0, -self.radius * (12.0 + 3.0 * i as f64)))
+                .map(|offset| object(Arc::clone(&self.mesh), offset, DMat4::IDENTITY))
+                .collect(),
+            // A floor through the model that faces down, while cameras are above it.
+            Unseen::FacingAway => {
+                let quads = self.mesh.triangles.len() * times / 2;
+                let columns = (quads as f64).sqrt().ceil() as u32;
+                let floor = shapes::plane(self.radius, self.radius, columns, columns);
+                vec![object(
+                    Arc::new(floor),
+                    self.center,
+                    DMat4::from_rotation_x(std::f64::consts::PI),
+                )]
+            }
+        };
+        Self {
+            mesh: Arc::clone(&self.mesh),
+            unseen: objects,
+            ..*self
+        }
+    }
+
     /// The scene under `count` lights.
-    pub fn scene(&self, count: usize) -> Scene {
+    pub(super) fn scene(&self, count: usize) -> Scene {
         let material = Material {
             ambient: [1.0; 3],
             diffuse: [0.6, 0.3, 0.2],
@@ -96,7 +138,8 @@ impl Model {
             material: 0,
             author_from_mesh: DMat4::IDENTITY,
         };
-        let mut scene = Scene::new(vec![material], vec![object]);
+        let objects = std::iter::once(object).chain(self.unseen.iter().cloned());
+        let mut scene = Scene::new(vec![material], objects.collect());
         scene.set_ambient([0.1; 3]);
         scene.set_background([0.0; 3]);
         scene.set_lights((0..count).map(|i| self.light(i, count)).collect());
@@ -118,7 +161,7 @@ impl Model {
     }
 
     /// View `k` of `views` of an image of that size.
-    pub fn camera(&self, k: u32, views: u32, [width, height]: [u32; 2]) -> Camera {
+    pub(super) fn camera(&self, k: u32, views: u32, [width, height]: [u32; 2]) -> Camera {
         let turn = TAU * f64::from(k) / f64::from(views);
         let elevation = (25.0 + 15.0 * (3.0 * turn).sin()).to_radians();
         let distance = self.radius * if width == height { 3.0 } else { 2.4 };

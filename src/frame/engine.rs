@@ -71,6 +71,10 @@ const WARM_UP_FRAMES: usize = 3;
 /// Refinement of a frame that warms up, in work units.
 const WARM_UP_UNITS: u64 = 1_000_000;
 
+/// An image that takes one thread less time than this, by nominal costs, is not shared among threads: waking them takes 10
+/// microseconds while they are busy, and 80 after they have slept.
+const LEAST_NS_TO_SHARE: f32 = 100_000.0;
+
 /// Refinement ends so much before it has to: what comes after it does not always take the same time.
 const MARGIN_MS: f64 = 0.03;
 
@@ -176,9 +180,14 @@ impl Engine {
     ) -> FrameStats {
         let allowance = Allowance::new(budget, &*self.clock, self.clock.now_ms());
         let (renderer, exec) = (&mut self.renderer, self.exec);
-        match &self.pool {
+        // Waking threads takes longer than some frames.
+        match self
+            .pool
+            .as_ref()
+            .filter(|_| renderer.needs_threads(scene, target))
+        {
             Some(pool) => pool.install(|| renderer.render(exec, scene, budget, allowance, target)),
-            None => renderer.render(exec, scene, budget, allowance, target),
+            None => renderer.render(exec.on_one_thread(), scene, budget, allowance, target),
         }
     }
 
@@ -243,13 +252,7 @@ impl Renderer {
         let mut stages = StageTimes::default();
         self.adopt(exec, scene);
         stages.cull += allowance.elapsed_ms();
-        // A larger image is none: backends leave a target alone that does not have the view's size.
-        let [width, height] =
-            [target.width(), target.height()].map(|side| side.min(MAX_IMAGE_SIDE));
-        let view = self
-            .world
-            .view(scene.camera(), width, height)
-            .with_encoding(self.encoding);
+        let view = self.view(scene, target);
 
         let is_seen = self.seen == Some(view);
         if !is_seen {
@@ -278,9 +281,7 @@ impl Renderer {
         self.presenting
             .learn(pixels_written, frame_ms - presenting_since);
 
-        let converged = !self.method.is_progressive()
-            || (self.refinement.is_finished()
-                && (!self.refines_first() || self.refine_first.is_up_to_date(&self.refinement)));
+        let converged = self.has_converged();
         let mut stats = FrameStats {
             frame: self.frames + 1,
             frame_ms,
@@ -306,6 +307,42 @@ impl Renderer {
         stats.skipped.pixels_unchanged = pixels.saturating_sub(pixels_written);
         self.frames += 1;
         stats
+    }
+
+    /// Whether the image of the view last seen is final, once it is lit.
+    fn has_converged(&self) -> bool {
+        !self.method.is_progressive()
+            || (self.refinement.is_finished()
+                && (!self.refines_first() || self.refine_first.is_up_to_date(&self.refinement)))
+    }
+
+    /// Whether a frame has enough to do to share it among threads. Not so where nothing has changed and nothing is left to be
+    /// refined or handed over, nor where a single image is drawn sooner than threads can be woken.
+    fn needs_threads(&self, scene: &Scene, target: &Target<'_>) -> bool {
+        let lights = match self.method {
+            Method::Phong => self.world.lights.len(),
+            _ => 0,
+        };
+        let pixels = target.width() as f32 * target.height() as f32;
+        let nominal_ns = cost::first_image(self.world.triangles.len() as f32, pixels, lights);
+        if !self.method.is_progressive() && nominal_ns < LEAST_NS_TO_SHARE {
+            return false;
+        }
+        let is_settled = self.placement.is_up_to_date(scene)
+            && self.is_lit
+            && self.seen == Some(self.view(scene, target))
+            && self.has_converged()
+            && self.backend.pending_pixels(target) == 0;
+        !is_settled
+    }
+
+    /// The view of the scene's camera in an image of the target's size.
+    fn view(&self, scene: &Scene, target: &Target<'_>) -> View {
+        // A larger image is none: backends leave a target alone that does not have the view's size.
+        let [width, height] =
+            [target.width(), target.height()].map(|side| side.min(MAX_IMAGE_SIDE));
+        let view = self.world.view(scene.camera(), width, height);
+        view.with_encoding(self.encoding)
     }
 
     /// Takes over what has changed of the scene.

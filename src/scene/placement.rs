@@ -117,6 +117,12 @@ impl Placement {
         (placement, world)
     }
 
+    /// Whether nothing of the scene has changed since it was seen last.
+    #[must_use]
+    pub fn is_up_to_date(&self, scene: &Scene) -> bool {
+        self.revisions == scene.revisions
+    }
+
     /// Brings `world` from the state of the scene that was seen last to its present one.
     pub fn update(&mut self, exec: Exec, world: &mut World, scene: &Scene) -> Changes {
         let (known, now) = (self.revisions, scene.revisions);

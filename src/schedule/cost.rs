@@ -38,6 +38,11 @@ pub const BOUNDS_LIGHT_NS: f32 = 153.0;
 /// Copying a pixel into the caller's frame, until the engine has measured it: see [`LearnedRate`](super::LearnedRate).
 pub const PRESENT_PIXEL_NS: f32 = 0.4;
 
+/// Drawing a first image: a part for each triangle of the scene, whether it is seen or not.
+pub const FIRST_TRIANGLE_NS: f32 = 20.0;
+/// See [`FIRST_TRIANGLE_NS`]: a part for each pixel of the image, as if a quarter of them were covered.
+pub const FIRST_PIXEL_NS: f32 = 0.75;
+
 /// Drawing everything once, on a backend that cannot repaint: a part for each triangle, until the engine has measured it.
 pub const DRAW_TRIANGLE_NS: f32 = 2700.0;
 /// See [`DRAW_TRIANGLE_NS`]: a part for each pixel that triangles cover, hidden ones included.
@@ -71,6 +76,13 @@ pub fn repaint(patches: f32, pixels: f32) -> f32 {
 #[must_use]
 pub fn phong(pixels: f32, lights: usize) -> f32 {
     PHONG_NS + pixels * (PHONG_PIXEL_NS + PHONG_PIXEL_LIGHT_NS * lights as f32)
+}
+
+/// A first image of `pixels` pixels of a scene of `triangles` triangles; `lights` are those that are evaluated at every pixel.
+#[must_use]
+pub fn first_image(triangles: f32, pixels: f32, lights: usize) -> f32 {
+    let shading = 0.25 * PHONG_PIXEL_LIGHT_NS * lights as f32;
+    triangles * FIRST_TRIANGLE_NS + pixels * (FIRST_PIXEL_NS + shading)
 }
 
 /// Drawing `triangles` triangles of `pixels` pixels altogether on a backend that cannot repaint.

@@ -3,6 +3,11 @@
 //! What [`TrianglePlanes`](crate::geometry::screen::TrianglePlanes) says, operation by operation, in lanes of `f64`. Each operation
 //! is rounded by itself, so the bits are the same at all levels, and those of the scalar rule: the tests compare them.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops run over several arrays of lanes at once"
+)]
+
 use crate::geometry::screen::DepthPlane;
 use crate::math::PixelPoint;
 use crate::simd::Simd;

@@ -17,6 +17,11 @@
 //! a block it is least and largest at corners.
 //! Pieces come in ascending order of slots, hence of ids, so "strictly nearer wins" leaves the smaller id in front at equal depth.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops run over several arrays of lanes at once"
+)]
+
 use super::setup::Piece;
 use super::shares::{Share, add_pixels};
 use super::tile::{

@@ -214,7 +214,7 @@ fn paint_job<'a, S: Simd>(
         }
         Fill::Phong { lights, remainder } => {
             let fill = PhongFill {
-                kit: work.kit(painter, owner.material),
+                kit: work.kit(painter, painter.material(owner)),
                 lights,
                 positions: gather(&world.positions, owner.vertices),
                 normals: gather(&world.normals, owner.vertices),

@@ -36,6 +36,12 @@ impl<'a> Painter<'a> {
         self.geometry.world
     }
 
+    /// A triangle's material, which may have changed since it was set up.
+    #[inline(always)]
+    pub(super) fn material(&self, drawn: &Drawn) -> u16 {
+        self.world().triangle_material[drawn.id as usize]
+    }
+
     /// What illuminating points of a material needs.
     pub(super) fn kit(&self, material: u16) -> ShadingKit<'a> {
         let world = self.world();
@@ -284,14 +290,15 @@ impl Surface for Phong<'_> {
         let (mut left, mut out) = (covered, background);
         while left != 0 {
             // All pixels with the material of the first.
-            let material = self.painter.shares.drawn(owners.first(left).0).material;
+            let first = self.painter.shares.drawn(owners.first(left).0);
+            let material = self.painter.material(first);
             let mut alike = S::mask32s::splat(simd, false);
             let (mut point, mut normal) = (background, background);
             let mut unseen = left;
             while unseen != 0 {
                 let (slot, mask) = owners.first(unseen);
                 let drawn = self.painter.shares.drawn(slot);
-                if drawn.material == material {
+                if self.painter.material(drawn) == material {
                     let w = owners.weights(simd, drawn);
                     let p = interpolate(simd, w, &gather(&world.positions, drawn.vertices));
                     let n = interpolate(simd, w, &gather(&world.normals, drawn.vertices));

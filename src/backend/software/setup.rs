@@ -59,8 +59,6 @@ pub(super) struct Drawn {
     pub id: u32,
     /// The world's vertices.
     pub vertices: [u32; 3],
-    /// The world's material.
-    pub material: u16,
     /// Whether it had to be clipped.
     pub is_clipped: bool,
 }
@@ -369,7 +367,6 @@ impl Setup<'_> {
             drawn.bounds = waiting.bounds;
             drawn.id = waiting.id;
             drawn.vertices = waiting.vertices;
-            drawn.material = world.triangle_material[waiting.id as usize];
             piece.slot = first_slot + i as u32;
             piece.bounds = waiting.bounds;
             piece.corners = waiting.corners;
@@ -415,7 +412,6 @@ impl Setup<'_> {
             bounds: pixels.into(),
             id,
             vertices: triangle,
-            material: world.triangle_material[id as usize],
             is_clipped: true,
         });
         for corners in outline.fan() {

@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Fewest triangles of a share, but for the last: enough work to be worth a task.
-const SMALLEST_SHARE: u64 = 512;
+const SMALLEST_SHARE: u64 = 1024;
 /// Most shares: each costs every tile a look into its bins.
 const MOST_SHARES: u64 = 64;
 

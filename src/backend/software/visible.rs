@@ -24,7 +24,7 @@ impl Visible {
         self.slot_of.resize_with(triangles, AtomicU32::default);
         let slot_of = &self.slot_of;
         exec.for_each_chunk(shares.used_mut(), 1, |_, share| {
-            share[0].list_visible(slot_of)
+            share[0].list_visible(slot_of);
         });
         self.ids.clear();
         for share in shares.used() {
