@@ -254,6 +254,26 @@ fn only_active_terms_are_added() {
     );
 }
 
+/// One coloured light more, which is not active, must not change a bit under grey ones.
+#[test]
+fn grey_lights_give_what_coloured_ones_give() {
+    let mut random = Random(5);
+    for _ in 0..100 {
+        let mut case = random_case(&mut random, 20.0, 35);
+        for light in &mut case.lights {
+            light.radiance = [light.radiance[0]; 3];
+        }
+        let active = ActiveLights::all(case.lights.len());
+        let grey = run(&case, SimdLevel::detect(), &active);
+        case.lights.push(ShadingLight {
+            vector: [0.0, 0.0, 1.0],
+            is_point: false,
+            radiance: [0.5, 0.25, 0.0],
+        });
+        assert_eq!(grey, run(&case, SimdLevel::detect(), &active));
+    }
+}
+
 /// Zero normals, points on lights and at the eye, lights opposite to the viewer, grazing light, extreme exponents: all must equal
 /// the reference, which has no light for a vector without direction, and never be NaN.
 #[test]

@@ -1,21 +1,31 @@
 //! Inverse square root and power function in SIMD lanes, the same bits on every machine with fused multiply-add.
 //!
-//! Hardware estimates differ between vendors, so both start from integers and use multiplications and additions only.
+//! Hardware estimates differ between vendors, so all start from integers and use multiplications and additions only.
 //!
-//! **Power.** `c^s` for a cosine given as `c = 1 - d` is `exp2(s log2(1 - d))`. A caller forms `d = |a - b|^2 / 2` of unit
-//! vectors by subtraction, which keeps its relative accuracy where `c` is near 1 and a large exponent needs it
-//! (DESIGN.md, "Illumination"). `1 - d = 2^k m` with `m` in `[sqrt(1/2), sqrt(2))`; `log2(m) = f Q(f)` with `f = m - 1`,
-//! but `f = -d`, exactly, where `k = 0`. `Q` has degree 8 (error 4.2e-8), `exp2` degree 5 (2.0e-7).
+//! **Inverse square root.** The seed is within 3.5 %; a Newton step turns an error `e` into at most `1.5 e^2`. [`rsqrt_lanes`] takes three, the last
+//! in residual form, so that little more than rounding the result is left. [`rsqrt_quick`] takes two with tuned constants: seed and first step
+//! are Jan Kadlec's (error 6.6e-4 with either sign), the second errs to one side by at most 6.4e-7, half of which is made good by scaling
+//! its constants. Rounding adds 1.6e-7 with fused operations (4.7e-7 is the worst for all `f32` of two binades, hence for all normal ones) and 2.2e-7 without.
 //!
-//! **Error.** What is below [`FLUSH`] becomes zero, so the exponent `y = s log2(1 - d)` is above -24, and its relative
-//! error of less than 4e-7 (in `Q`, three products and a sum) becomes one of at most 24 ln 2 x 4e-7 in the power: given `d`, the
-//! relative error is below [`POWER_ERROR`], whatever `s` is. An error `e` of the unit vectors becomes one of `|a - b| e`
-//! in `d`, hence of at most `0.61 sqrt(s) e` in the power (the maximum of `exp(-x) sqrt(2 x s)`), which is
-//! 4e-6 at `s = 1000` for `e = 2e-7`. For `0 < s < 1` the slope of `c^s` at `c = 0` is infinite and so is the amplification there.
+//! **Power.** `c^s` for a cosine given by `q = |a - b|^2` of unit vectors, `c = 1 - q / 2`, is `exp2(s log2(c))`. A caller forms `a - b`
+//! by subtraction, which keeps the relative accuracy of `q` where `c` is near 1 and a large exponent needs it
+//! (DESIGN.md, "Illumination"). `c = 2^k m` with `m` in `[sqrt(1/2), sqrt(2))`; `log2(m) = f Q(f)` with `f = m - 1`, formed as
+//! `2^-k (1 - q / 2) - 1` by one fused operation, and `f = -q / 2`, exactly, where `k = 0`. For exponents of [`STEEP`] and more,
+//! `c > 0.594` wherever the power is not flushed, and `log2(c) = q R(q)` saves that reduction. `Q` has degree 6, `R`
+//! degree 5, `exp2` degree 4: minimax polynomials of the relative error, found by Remez's exchange in double precision and rounded to `f32`
+//! coefficient by coefficient. Their errors are 1.1e-6, 1.2e-6 and 3.6e-6.
+//!
+//! **Error.** What is below [`FLUSH`] becomes zero, so the exponent `y = s log2(c)` is above -24, and its relative
+//! error of 1.2e-6 in the polynomial and less than 4e-7 by rounding (in the polynomial, three products and a sum) becomes one of at most
+//! 24 ln 2 x 1.6e-6 = 2.7e-5 in the power, to which `exp2` adds 4e-6: given `q`, the relative error is below [`POWER_ERROR`],
+//! whatever `s` is. That is at most 0.01 codes of 8 bits, linear or sRGB: relative errors count most at white, where a code is 0.4 % or more.
+//! An error `e` of the unit vectors across `a - b` is harmless; in general it becomes one of `2 |a - b| e`
+//! in `q`, hence of at most `0.61 sqrt(s) e` in the power (the maximum of `exp(-x) sqrt(2 x s)`), which is
+//! 4e-6 at `s = 1000` for `e = 2e-7`. An error of length alone of `a` or `b` counts less: it changes `q` by
+//! `e q` to first order, and the power by at most `24 ln 2 e`. For `0 < s < 1` the slope of `c^s` at `c = 0` is infinite and so is the amplification there.
 
 use crate::simd::Simd;
 use fearless_simd::prelude::*;
-use std::f32::consts::{LN_2, LOG2_E};
 
 /// Powers below this are flushed to zero: with 255 codes and the slope of the sRGB curve they are far from visible.
 pub const FLUSH: f64 = 1.0 / (1_u32 << 24) as f64;
@@ -23,8 +33,14 @@ pub const FLUSH: f64 = 1.0 / (1_u32 << 24) as f64;
 /// Bound of the relative error of [`rsqrt_lanes`].
 pub const RSQRT_ERROR: f64 = 2e-7;
 
-/// Bound of the relative error of [`Power::lanes`], given `d`.
-pub const POWER_ERROR: f64 = 7e-6;
+/// Bound of the relative error of [`rsqrt_quick`].
+pub const QUICK_RSQRT_ERROR: f64 = 6e-7;
+
+/// Bound of the relative error of [`Power::lanes`], given the squared distance.
+pub const POWER_ERROR: f64 = 4e-5;
+
+/// From this exponent on, powers above [`FLUSH`] have `c > 2^(-24/32) = 0.594`: a logarithm without reduction of the range.
+const STEEP: f32 = 32.0;
 
 /// `1 / sqrt(x)` for finite `x >= 0`, with a relative error below [`RSQRT_ERROR`] for normal numbers.
 ///
@@ -41,6 +57,18 @@ pub fn rsqrt_lanes<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
     // The same step in residual form: only the last addition rounds a large number.
     let residual = (minus_half * y).mul_add(y, splat(0.5));
     y.mul_add(residual, y)
+}
+
+/// `1 / sqrt(x)` like [`rsqrt_lanes`] in nine operations instead of twelve, with a relative error below [`QUICK_RSQRT_ERROR`].
+#[inline(always)]
+pub fn rsqrt_quick<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
+    let splat = |v: f32| S::f32s::splat(simd, v);
+    let seed = S::u32s::splat(simd, 0x5f1f_fff9) - (x.bitcast::<S::u32s>() >> 1);
+    let y: S::f32s = seed.bitcast();
+    // 1 / (k sqrt(x)) for k = 0.703952253, within 6.6e-4.
+    let y = y * (x * -y).mul_add(y, splat(2.389_244_6));
+    // With 3/2 k and k^3 / 2, times 1 + 3.17e-7: half of what the step falls short at most.
+    y * (x * splat(-0.174_421_4) * y).mul_add(y, splat(1.055_928_7))
 }
 
 /// A specular exponent made ready.
@@ -61,9 +89,9 @@ impl Power {
         };
         // (1 - d)^s < 2^-24 beyond d = 1 - 2^(-24 / s); never reached for s = 0, where only d < 1 counts.
         let cut = if exponent > 0.0 {
-            -libm::expm1(FLUSH.ln() / f64::from(exponent))
+            -2.0 * libm::expm1(FLUSH.ln() / f64::from(exponent))
         } else {
-            1.0
+            2.0
         };
         Self {
             exponent,
@@ -71,39 +99,52 @@ impl Power {
         }
     }
 
-    /// The power is zero exactly where `d` is not below this; at most 1.
+    /// Whether the square of [`QUICK_RSQRT_ERROR`] matters: from 1e7 on it changes a power by more than 5e-6.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_extreme(self) -> bool {
+        self.exponent >= 1e7
+    }
+
+    /// The power is zero exactly where the squared distance is not below this; at most 2.
     #[inline(always)]
     #[must_use]
     pub fn cut(self) -> f32 {
         self.cut
     }
 
-    /// `(1 - d)^s` for `0 <= d < cut`; anything where `d` is outside of that.
+    /// `c^s = (1 - q/2)^s` for a squared distance `0 <= q < cut`; anything where `q` is outside of that.
     #[inline(always)]
-    pub fn lanes<S: Simd>(self, simd: S, d: S::f32s) -> S::f32s {
+    pub fn lanes<S: Simd>(self, simd: S, q: S::f32s) -> S::f32s {
         let splat = |v: f32| S::f32s::splat(simd, v);
-        let c: S::i32s = (splat(1.0) - d).bitcast();
+        if self.exponent >= STEEP {
+            let slope = splat(-0.013_086_62)
+                .mul_add(q, splat(0.001_727_276_8))
+                .mul_add(q, splat(-0.027_618_18))
+                .mul_add(q, splat(-0.059_076_65))
+                .mul_add(q, splat(-0.180_412_35))
+                .mul_add(q, splat(-0.721_346_6));
+            return exp2_lanes(simd, q * splat(self.exponent) * slope);
+        }
+        let c: S::i32s = q.mul_add(splat(-0.5), splat(1.0)).bitcast();
         // Exponent relative to sqrt(1/2); the shift is arithmetic.
         let k = (c - S::i32s::splat(simd, 0x3f35_04f3)) >> 23;
-        let m: S::f32s = (c - (k << 23)).bitcast();
-        let f = k
-            .simd_eq(S::i32s::splat(simd, 0))
-            .select(-d, m - splat(1.0));
-        let q = splat(0.123_109_84)
-            .mul_add(f, splat(-0.205_862_13))
-            .mul_add(f, splat(0.216_078_28))
-            .mul_add(f, splat(-0.239_169_85))
-            .mul_add(f, splat(0.287_903_25))
-            .mul_add(f, splat(-0.360_693_28))
-            .mul_add(f, splat(0.480_910_75))
-            .mul_add(f, splat(-0.721_347_45))
-            .mul_add(f, splat(LOG2_E));
-        let log2 = f.mul_add(q, k.to_float::<S::f32s>());
+        // -2^-k / 2, so that f = 2^-k (1 - q/2) - 1 is rounded once, and not at all where k = 0.
+        let scale: S::f32s = (S::i32s::splat(simd, 0xbf00_0000_u32 as i32) - (k << 23)).bitcast();
+        let f = q.mul_add(scale, scale.mul_add(splat(-2.0), splat(-1.0)));
+        let slope = splat(0.171_624_56)
+            .mul_add(f, splat(-0.269_320_22))
+            .mul_add(f, splat(0.295_699_5))
+            .mul_add(f, splat(-0.359_371_63))
+            .mul_add(f, splat(0.480_626_76))
+            .mul_add(f, splat(-0.721_363_6))
+            .mul_add(f, splat(1.442_696_5));
+        let log2 = f.mul_add(slope, k.to_float::<S::f32s>());
         exp2_lanes(simd, log2 * splat(self.exponent))
     }
 }
 
-/// `2^y` for `-125 <= y <= 127`, with a relative error below 4e-7 besides that of `y`.
+/// `2^y` for `-125 <= y <= 127`, with a relative error below 4e-6 besides that of `y`.
 #[inline(always)]
 fn exp2_lanes<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
     let splat = |v: f32| S::f32s::splat(simd, v);
@@ -112,11 +153,10 @@ fn exp2_lanes<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
     let rounded = y + magic;
     let f = y - (rounded - magic);
     // The last coefficient is 1, so that 2^0 is.
-    let p = splat(0.001_338_130_2)
-        .mul_add(f, splat(0.009_666_368))
-        .mul_add(f, splat(0.055_503_81))
-        .mul_add(f, splat(0.240_223_5))
-        .mul_add(f, splat(LN_2))
+    let p = splat(0.009_782_913)
+        .mul_add(f, splat(0.055_976_883))
+        .mul_add(f, splat(0.240_207_1))
+        .mul_add(f, splat(0.693_113_6))
         .mul_add(f, splat(1.0));
     (p.bitcast::<S::u32s>() + (rounded.bitcast::<S::u32s>() << 23)).bitcast()
 }
@@ -126,14 +166,22 @@ mod tests {
     use super::*;
     use crate::simd::{SimdLevel, dispatch};
 
-    fn map(level: SimdLevel, xs: &[f32], power: Option<Power>) -> Vec<f32> {
+    #[derive(Clone, Copy)]
+    enum Function {
+        Power(Power),
+        Rsqrt,
+        QuickRsqrt,
+    }
+
+    fn map(level: SimdLevel, xs: &[f32], function: Function) -> Vec<f32> {
         #[inline(always)]
-        fn kernel<S: Simd>(simd: S, xs: &mut [f32], power: Option<Power>) {
+        fn kernel<S: Simd>(simd: S, xs: &mut [f32], function: Function) {
             for chunk in xs.chunks_exact_mut(S::f32s::LEN) {
                 let x = S::f32s::from_slice(simd, chunk);
-                match power {
-                    Some(power) => power.lanes(simd, x),
-                    None => rsqrt_lanes(simd, x),
+                match function {
+                    Function::Power(power) => power.lanes(simd, x),
+                    Function::Rsqrt => rsqrt_lanes(simd, x),
+                    Function::QuickRsqrt => rsqrt_quick(simd, x),
                 }
                 .store_slice(chunk);
             }
@@ -141,7 +189,7 @@ mod tests {
         let mut padded = xs.to_vec();
         padded.resize(xs.len().next_multiple_of(16), 0.25);
         let level = level.token().expect("available");
-        dispatch!(level, simd => kernel(simd, &mut padded, power));
+        dispatch!(level, simd => kernel(simd, &mut padded, function));
         padded.truncate(xs.len());
         padded
     }
@@ -152,28 +200,38 @@ mod tests {
             .step_by(10_007)
             .map(f32::from_bits)
             .collect();
-        for level in SimdLevel::available() {
-            let mut worst = 0.0_f64;
-            for (&x, y) in xs.iter().zip(map(level, &xs, None)) {
-                worst = worst.max((f64::from(y) * f64::from(x).sqrt() - 1.0).abs());
+        for (function, bound) in [
+            (Function::Rsqrt, RSQRT_ERROR),
+            (Function::QuickRsqrt, QUICK_RSQRT_ERROR),
+        ] {
+            for level in SimdLevel::available() {
+                let mut worst = 0.0_f64;
+                for (&x, y) in xs.iter().zip(map(level, &xs, function)) {
+                    worst = worst.max((f64::from(y) * f64::from(x).sqrt() - 1.0).abs());
+                }
+                assert!(worst < bound, "{level}: error {worst:e}");
+                let at_zero = map(level, &[0.0], function)[0];
+                assert!(at_zero.is_finite() && at_zero * 0.0 == 0.0);
             }
-            assert!(worst < RSQRT_ERROR, "{level}: error {worst:e}");
-            let at_zero = map(level, &[0.0], None)[0];
-            assert!(at_zero.is_finite() && at_zero * 0.0 == 0.0);
         }
     }
 
     #[test]
     fn powers_are_accurate_for_every_exponent() {
-        for exponent in [0.01, 0.5, 1.0, 2.0, 7.3, 50.0, 300.0, 1e3, 1e4, 1e6] {
+        for exponent in [
+            0.01, 0.5, 1.0, 2.0, 7.3, 24.0, 31.99, 32.0, 50.0, 300.0, 1e3, 1e4, 1e6, 1e9,
+        ] {
             let power = Power::new(exponent);
-            let ds: Vec<f32> = (0..20_000)
+            let squares: Vec<f32> = (0..20_000)
                 .map(|i| power.cut() * (i as f32 / 20_000.0).powi(3))
                 .collect();
             for level in SimdLevel::available() {
                 let mut worst = 0.0_f64;
-                for (&d, p) in ds.iter().zip(map(level, &ds, Some(power))) {
-                    let exact = (f64::from(exponent) * libm::log1p(-f64::from(d))).exp();
+                for (&q, p) in squares
+                    .iter()
+                    .zip(map(level, &squares, Function::Power(power)))
+                {
+                    let exact = (f64::from(exponent) * libm::log1p(-0.5 * f64::from(q))).exp();
                     worst = worst.max((f64::from(p) / exact - 1.0).abs());
                 }
                 assert!(
@@ -188,7 +246,7 @@ mod tests {
     fn the_cut_is_where_powers_fall_below_the_flush() {
         for exponent in [1.0_f32, 10.0, 1e3, 1e5] {
             let cut = f64::from(Power::new(exponent).cut());
-            let there = (f64::from(exponent) * libm::log1p(-cut)).exp();
+            let there = (f64::from(exponent) * libm::log1p(-0.5 * cut)).exp();
             // Rounding 1 - 2^-24 to f32 may move it by half.
             assert!(
                 (0.4..=1.6).contains(&(there / FLUSH)),
@@ -196,9 +254,9 @@ mod tests {
             );
         }
         for odd in [0.0, -1.0, f32::NAN] {
-            assert_eq!(Power::new(odd).cut(), 1.0);
+            assert_eq!(Power::new(odd).cut(), 2.0);
             assert_eq!(
-                map(SimdLevel::Scalar, &[0.75], Some(Power::new(odd))),
+                map(SimdLevel::Scalar, &[0.75], Function::Power(Power::new(odd))),
                 [1.0]
             );
         }
