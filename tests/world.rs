@@ -1,9 +1,11 @@
 //! From author space to pixels: nothing may be lost on the way, whatever the size and place of the scene.
 
 use glam::{DMat3, DMat4, DVec3};
+use specula::geometry::Mesh;
 use specula::scene::{
     Camera, Eye, Light, LightKind, Material, Object, Projection, Revisions, Scene, World,
 };
+use std::sync::Arc;
 
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 360;
@@ -449,7 +451,7 @@ fn materials_are_premultiplied_and_default_ones_are_shared() {
             .collect::<Vec<_>>(),
         [1, 0, 1]
     );
-    assert!(std::sync::Arc::ptr_eq(
+    assert!(Arc::ptr_eq(
         &scene.objects()[0].mesh,
         &scene.objects()[2].mesh
     ));
@@ -595,4 +597,22 @@ fn a_face_seen_from_outside_turns_counter_clockwise_on_the_screen() {
             assert_eq!(towards_eye > 0.0, area < 0.0, "{t:?}");
         }
     }
+}
+
+#[test]
+fn a_mesh_put_together_by_hand_may_lack_normals() {
+    let mesh = Mesh {
+        positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
+        normals: vec![DVec3::Z; 3],
+        triangles: vec![[0, 1, 2], [1, 2, 3]],
+    };
+    let object = Object {
+        mesh: Arc::new(mesh),
+        material: 0,
+        author_from_mesh: DMat4::IDENTITY,
+    };
+    let world = World::new(&Scene::new(Vec::new(), vec![object]));
+    // What uses the vertex without a normal is left out.
+    assert_eq!(world.triangles, [[0, 1, 2]]);
+    assert_eq!(world.positions.len(), 3);
 }

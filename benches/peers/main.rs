@@ -1,7 +1,7 @@
 //! Our Gouraud and Phong frames beside those of Mesa's llvmpipe and of the crate `euc`, measured in turns on the same machine.
 //!
 //! ```sh
-//! benches/peers/setup.sh DIR                # builds the peers into DIR, about two minutes; Debian, as root
+//! benches/peers/setup.sh DIR                # builds the peers into DIR: 2 GB, a few minutes; Debian, as root
 //! cargo bench --bench peers -- --peers DIR  # the whole table, about fifteen minutes; --help tells how to have less
 //! ```
 //!

@@ -1,6 +1,7 @@
 //! The engine: the one place that knows all stages.
 //!
-//! `engine.rs` holds the frame loop. Read it first; it says what happens in a frame and in which order. `base.rs` draws
+//! `renderer.rs` holds the frame loop. Read it first; it says what happens in a frame and in which order. `engine.rs` is what its users
+//! see. `base.rs` draws
 //! the first image, `refinement/` makes it better; `refine_first.rs` is how, where the backend cannot repaint.
 
 mod base;
@@ -9,6 +10,7 @@ mod method;
 mod options;
 mod refine_first;
 mod refinement;
+mod renderer;
 mod stats;
 
 pub use engine::Engine;

@@ -107,10 +107,12 @@ fn shade_words<S: Simd>(
                 let kit = match known {
                     Some((last, kit)) if last == material => kit,
                     _ => {
-                        ShadingKit::new(eye, &world.materials[usize::from(material)], &world.lights)
+                        let properties = &world.materials[usize::from(material)];
+                        let kit = ShadingKit::new(eye, properties, &world.lights);
+                        known = Some((material, kit));
+                        kit
                     }
                 };
-                known = Some((material, kit));
                 let group = Group { start, mask };
                 let point = group.load(simd, &world.positions);
                 let normal = group.load(simd, &world.normals);

@@ -61,7 +61,8 @@ impl Part {
         let is_indexable = u32::try_from(vertex + mesh.positions.len()).is_ok();
         debug_assert!(is_indexable, "too many vertices");
         let count = if is_indexable {
-            mesh.positions.len()
+            // A mesh put together by hand may lack normals; what uses such vertices is left out.
+            mesh.positions.len().min(mesh.normals.len())
         } else {
             0
         };

@@ -78,11 +78,10 @@ pub fn phong(pixels: f32, lights: usize) -> f32 {
     PHONG_NS + pixels * (PHONG_PIXEL_NS + PHONG_PIXEL_LIGHT_NS * lights as f32)
 }
 
-/// A first image of `pixels` pixels of a scene of `triangles` triangles; `lights` are those that are evaluated at every pixel.
+/// A first image of `pixels` pixels of a scene of `triangles` triangles, without its illumination.
 #[must_use]
-pub fn first_image(triangles: f32, pixels: f32, lights: usize) -> f32 {
-    let shading = 0.25 * PHONG_PIXEL_LIGHT_NS * lights as f32;
-    triangles * FIRST_TRIANGLE_NS + pixels * (FIRST_PIXEL_NS + shading)
+pub fn first_image(triangles: f32, pixels: f32) -> f32 {
+    triangles * FIRST_TRIANGLE_NS + pixels * FIRST_PIXEL_NS
 }
 
 /// Drawing `triangles` triangles of `pixels` pixels altogether on a backend that cannot repaint.

@@ -5,8 +5,8 @@
 //! | pass | over | does |
 //! |---|---|---|
 //! | `transform` | blocks of vertices | pixel space, clipping planes, sub-pixel grid |
-//! | `setup`, `planes` | `shares` of triangles | culls, clips, works out planes, sorts into tiles |
-//! | `raster` | tiles | coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them; counts owners' pixels |
+//! | `setup` | `shares` of triangles | culls (`judge`), clips (`outline`), works out `planes`, sorts into tiles |
+//! | `raster` | tiles | by `edges` and a `brush`: coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them; counts owners' pixels |
 //! | `visible` | shares | lists the owners |
 //! | `resolve` | tiles | colours |
 //! | `repaint` | tiles | colours of parts of triangles |
@@ -15,9 +15,14 @@
 //! No pass's result depends on the number of threads, nor coverage, depth and ids on the SIMD level. All memory is kept from
 //! image to image.
 
+mod brush;
+mod edges;
 mod fill;
+mod judge;
 mod lanes;
+mod outline;
 mod patch;
+mod pixel_batch;
 mod planes;
 mod present;
 mod raster;
@@ -143,7 +148,7 @@ impl SoftwareBackend {
     }
 
     /// The first step of [`rasterize`](Backend::rasterize), public for benchmarks only, as are the others: makes room for the
-    /// image, cuts triangles into shares, and transforms their vertices.
+    /// image, cuts triangles into shares, and transforms their vertices. None may be left out.
     #[doc(hidden)]
     pub fn transform(&mut self, exec: Exec, geometry: Geometry<'_>) {
         self.fit(geometry);
@@ -161,7 +166,7 @@ impl SoftwareBackend {
         });
     }
 
-    /// The third step: who owns which pixel.
+    /// The third step: who owns which pixel. Each time it adds to the counts of pixels, which the second step begins anew.
     #[doc(hidden)]
     pub fn draw(&mut self, exec: Exec) {
         let shares = self.shares.used();

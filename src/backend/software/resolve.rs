@@ -68,7 +68,7 @@ pub(super) fn resolve_tile<S: Simd>(
     if tile.owned.is_empty() {
         return;
     }
-    painter.shares.fetch(index);
+    painter.shares.prefetch(index);
     match paint {
         // Parts are for backends that cannot repaint.
         BasePaint::Gouraud(colours) | BasePaint::Refined { colours, .. } => {

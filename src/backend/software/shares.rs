@@ -212,14 +212,14 @@ impl Shares {
     /// its time on a fine mesh. In the order of the bins they lie next to each other for the most part, and loads
     /// that do not wait for one another overlap.
     #[inline(always)]
-    pub(super) fn fetch(&self, tile: usize) {
+    pub(super) fn prefetch(&self, tile: usize) {
         let mut sum = 0_u32;
         for share in self.used() {
             for piece in share.bin(tile) {
                 sum = sum.wrapping_add(share.drawn[place(piece.slot)].id);
             }
         }
-        // Somebody might want to know.
+        // Otherwise nothing would be loaded.
         std::hint::black_box(sum);
     }
 

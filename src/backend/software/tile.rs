@@ -14,7 +14,7 @@
 //!
 //! Tiles at the right and the bottom may hang over the image; their pixels outside never get a triangle.
 
-use crate::geometry::screen::MAX_IMAGE_SIDE;
+use crate::geometry::screen::{MAX_IMAGE_SIDE, PixelBox};
 
 /// Width and height of a tile in pixels.
 pub(super) const TILE_SIDE: usize = 64;
@@ -160,6 +160,7 @@ impl Tile {
         self.width as u64 * self.height as u64
     }
 }
+
 /// How an image is cut into tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Grid {
@@ -218,8 +219,8 @@ pub(super) struct Bounds {
     pub y1: u16,
 }
 
-impl From<crate::geometry::screen::PixelBox> for Bounds {
-    fn from(b: crate::geometry::screen::PixelBox) -> Self {
+impl From<PixelBox> for Bounds {
+    fn from(b: PixelBox) -> Self {
         // Pixel boxes lie inside the image, whose sides fit 16 bits.
         let [x0, y0, x1, y1] = [b.x0, b.y0, b.x1, b.y1].map(|v| v as u16);
         Self { x0, y0, x1, y1 }

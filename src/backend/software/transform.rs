@@ -27,7 +27,7 @@ const BLOCKS_PER_TASK: usize = 128;
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(16))]
 pub(super) struct SnappedVertex {
-    /// Where; valid if the outcode is zero.
+    /// Where; the image's corner if the outcode is not zero.
     pub position: [i32; 2],
     /// Clipping planes that the vertex is outside of.
     pub outcode: i32,
@@ -91,7 +91,7 @@ impl Vertices {
     }
 }
 
-/// Transforms a block whose first vertex is `first`. Behind the world's last vertex it is repeated.
+/// Transforms a block whose first vertex is `first`. Behind the world's last vertex its last one is repeated.
 #[inline(always)]
 fn transform_block<S: Simd>(
     simd: S,
@@ -103,8 +103,9 @@ fn transform_block<S: Simd>(
     let positions = &geometry.world.positions;
     let used = BLOCK.min(positions.len() - first);
     let widen = |from: &[f32]| {
-        let mut out = [0.0; BLOCK];
-        for (out, &value) in out.iter_mut().zip(&from[first..first + used]) {
+        let from = &from[first..first + used];
+        let mut out = [f64::from(from[used - 1]); BLOCK];
+        for (out, &value) in out.iter_mut().zip(from) {
             *out = f64::from(value);
         }
         out
@@ -131,6 +132,10 @@ fn transform_block<S: Simd>(
     if !inside {
         for (snapped, point) in snapped.iter_mut().zip(points) {
             snapped.outcode = i32::from(outcode(*point));
+            if snapped.outcode != 0 {
+                // It may have been no number.
+                snapped.position = [0; 2];
+            }
         }
     }
 }
