@@ -13,7 +13,7 @@ use crate::geometry::screen::{EdgeFunction, SUBPIXEL_BITS};
 const MOST_EDGES: usize = 5;
 
 /// A small piece's edges are shorter than this along both axes, in sub-pixels, so that their values fit `i32` wherever it is drawn.
-const SMALL: i32 = 16 << SUBPIXEL_BITS;
+const SMALL: i32 = 64 << SUBPIXEL_BITS;
 
 /// A rectangle of blocks, inclusive.
 #[derive(Clone, Copy)]

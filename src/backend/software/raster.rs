@@ -6,7 +6,7 @@
 //! that no pixel of the blocks in question violates is left out; if every pixel violates one, so are the blocks. Any other changes
 //! its sign within 64 x 64 pixels, hence is nowhere larger than `63 * 2^24 < 2^30`: `i32` does not overflow.
 //!
-//! A [small](small_edges) piece that touches at most 3 x 3 blocks, in a tile that does not hang over the image, needs no such
+//! A [small](small_edges) piece that touches few blocks, in a tile that does not hang over the image, needs no such
 //! questions: all numbers are small, and every block is tried. Others go through **rows of blocks**: for all blocks of a row at once, lanes tell
 //! which of them an edge rules out, which lie inside of all edges, and in which the piece nowhere comes nearer than what is there
 //! already. The latter is known by a depth for each block that none of its pixels is farther than. It rises when a piece covers
@@ -33,8 +33,8 @@ use crate::simd::Simd;
 use fearless_simd::{Select, SimdBase, SimdInt, SimdMask};
 
 /// A small piece touches at most so many blocks along each axis: they are tried one by one in less time than it takes to find
-/// out which of them have a pixel.
-const SMALL_BLOCKS: usize = 3;
+/// out which of them have a pixel. Of 3, 4, 5 and 7 measured, the last was fastest, by 15 % on triangles of 60 pixels.
+const SMALL_BLOCKS: usize = 7;
 
 /// Draws a tile's triangles and counts the pixels of each.
 #[inline(always)]
