@@ -290,14 +290,33 @@ impl Rows {
         ]
     }
 
+    /// The blocks across in which all pixels of rows `y0..=y1` of a row of blocks are in the columns found, as the first and the one
+    /// behind the last; none unless these are all rows of the blocks.
+    #[inline(always)]
+    pub(super) fn full_blocks(&self, y0: usize, y1: usize) -> [usize; 2] {
+        if y1 - y0 + 1 < BLOCK_SIDE {
+            return [0, 0];
+        }
+        let (mut first, mut end) = (0, TILE_SIDE as i32);
+        for y in y0..=y1 {
+            first = first.max(self.first[y]);
+            end = end.min(self.last[y] + 1);
+        }
+        let side = BLOCK_SIDE as i32;
+        [
+            ((first + side - 1) / side) as usize,
+            (end / side).max(0) as usize,
+        ]
+    }
+
     /// Which pixels of a block, whose corner is at `(x, y)`, lie in the rows `y0..=y1` and in the columns found; one bit each.
     #[inline(always)]
     pub(super) fn within_block(&self, [x, y]: [i32; 2], y0: usize, y1: usize) -> u32 {
         let side = BLOCK_SIDE as i32;
         let mut bits = 0;
         for row in y0..=y1 {
-            let first = (self.first[row] - x).clamp(0, side);
-            let end = (self.last[row] + 1 - x).clamp(first, side);
+            let first = (self.first[row] - x).max(0).min(side);
+            let end = (self.last[row] + 1 - x).min(side).max(first);
             bits |= ((1 << end) - (1 << first)) << (side * (row as i32 - y));
         }
         bits

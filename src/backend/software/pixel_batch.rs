@@ -17,6 +17,9 @@ use crate::output::encode::encode_lanes;
 use crate::simd::Simd;
 use fearless_simd::{Bytes, Select, SimdBase, SimdInt, SimdMask};
 
+/// A bit for each pixel of a block.
+const ALL_PIXELS: u32 = (1 << BLOCK_PIXELS) - 1;
+
 /// Pixels of a batch, at most: as many as keep it in the first-level cache, cheap to clear.
 const BATCH: usize = 256;
 
@@ -33,6 +36,8 @@ pub(super) struct Search {
     /// The next block in it, and the one behind the last.
     next: usize,
     end: usize,
+    /// The blocks in it, as the first and the one behind the last, all pixels of which are to be looked at.
+    full: [usize; 2],
 }
 
 impl Search {
@@ -44,6 +49,7 @@ impl Search {
             block_row: y0 / BLOCK_SIDE,
             next: 0,
             end: 0,
+            full: [0; 2],
         };
         search.enter_row(rows);
         search
@@ -69,6 +75,7 @@ impl Search {
     fn enter_row(&mut self, rows: &Rows) {
         let [y0, y1] = self.rows_here();
         [self.next, self.end] = rows.blocks(y0, y1);
+        self.full = rows.full_blocks(y0, y1);
     }
 
     #[inline(always)]
@@ -156,7 +163,11 @@ impl Batch {
                     continue;
                 }
                 let block = search.block_row * BLOCKS_ACROSS + column;
-                let within = rows.within_block(block_corner(block), y0, y1);
+                let within = if (search.full[0]..search.full[1]).contains(&column) {
+                    ALL_PIXELS
+                } else {
+                    rows.within_block(block_corner(block), y0, y1)
+                };
                 for part in 0..BLOCK_PIXELS / lanes {
                     let at = block * BLOCK_PIXELS + part * lanes;
                     let slots = S::u32s::from_slice(simd, &tile.slot[at..at + lanes]);
