@@ -10,7 +10,7 @@
 //! **Power.** `c^s` for a cosine given by `q = |a - b|^2` of unit vectors, `c = 1 - q / 2`, is `exp2(s log2(c))`. A caller forms `a - b`
 //! by subtraction, which keeps the relative accuracy of `q` where `c` is near 1 and a large exponent needs it
 //! (DESIGN.md, "Illumination"). `c = 2^k m` with `m` in `[sqrt(1/2), sqrt(2))`; `log2(m) = f Q(f)` with `f = m - 1`, formed as
-//! `2^-k (1 - q / 2) - 1` by one fused operation, and `f = -q / 2`, exactly, where `k = 0`. For exponents of [`STEEP`] and more,
+//! `2^-k (1 - q / 2) - 1` by one fused operation, and `f = -q / 2`, exactly, where `k = 0`. For exponents of `STEEP` and more,
 //! `c > 0.594` wherever the power is not flushed, and `log2(c) = q R(q)` saves that reduction. `Q` has degree 6, `R`
 //! degree 5, `exp2` degree 4: minimax polynomials of the relative error, found by Remez's exchange in double precision and rounded to `f32`
 //! coefficient by coefficient. Their errors are 1.1e-6, 1.2e-6 and 3.6e-6.
