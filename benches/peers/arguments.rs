@@ -1,6 +1,9 @@
 //! The command line of the comparison.
 
-use std::path::PathBuf;
+use super::programs::Cell;
+use super::scene::Model;
+use std::error::Error;
+use std::path::{Path, PathBuf};
 
 pub(super) const USAGE: &str = "\
 usage: cargo bench --bench peers -- [OPTIONS]
@@ -122,6 +125,28 @@ impl Arguments {
             }
         }
         Ok(parsed)
+    }
+
+    /// Calls `f` for every cell of the table, with its mesh, until it fails.
+    pub(super) fn for_each_cell(
+        &self,
+        mut f: impl FnMut(&Model, Cell) -> Result<(), Box<dyn Error>>,
+    ) -> Result<(), Box<dyn Error>> {
+        let peers = self.peers.as_deref().unwrap_or(Path::new("."));
+        for &mesh in &self.meshes {
+            let model = Model::load(&peers.join(format!("teapot{mesh}.mesh")))?;
+            for &size in &self.sizes {
+                for &shading in &self.shadings {
+                    let cell = Cell {
+                        mesh,
+                        size,
+                        shading,
+                    };
+                    f(&model, cell)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The option without a value that has this name.

@@ -6,32 +6,17 @@ use super::programs::{Cell, Ours};
 use super::scene::{Model, Unseen};
 use specula::output::Encoding;
 use std::error::Error;
-use std::path::Path;
 
 /// Times as many triangles that are not seen.
 const UNSEEN: usize = 10;
 
 /// Prints a row for each cell.
 pub(super) fn measure(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let peers = arguments.peers.as_deref().unwrap_or(Path::new("."));
     println!(
         "triangles  size       shading    1 thread ms  {} threads ms  ratio  unchanged  share    {UNSEEN}x off screen  {UNSEEN}x facing away",
         arguments.threads
     );
-    for &mesh in &arguments.meshes {
-        let model = Model::load(&peers.join(format!("teapot{mesh}.mesh")))?;
-        for &size in &arguments.sizes {
-            for &shading in &arguments.shadings {
-                let cell = Cell {
-                    mesh,
-                    size,
-                    shading,
-                };
-                row(arguments, &model, cell)?;
-            }
-        }
-    }
-    Ok(())
+    arguments.for_each_cell(|model, cell| row(arguments, model, cell))
 }
 
 fn row(arguments: &Arguments, model: &Model, cell: Cell) -> Result<(), Box<dyn Error>> {

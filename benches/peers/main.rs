@@ -108,24 +108,15 @@ fn compare(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     println!("{}", Row::HEADER);
     let mut rows = Vec::new();
-    for &mesh in &arguments.meshes {
-        let model = Model::load(&peers.join(format!("teapot{mesh}.mesh")))?;
-        for &size in &arguments.sizes {
-            for &shading in &arguments.shadings {
-                let cell = Cell {
-                    mesh,
-                    size,
-                    shading,
-                };
-                let row = measure(arguments, &model, cell, llvmpipe.as_ref())?;
-                println!("{}", row.text());
-                if let Some(csv) = &mut csv {
-                    writeln!(csv, "{}", row.csv())?;
-                }
-                rows.push(row);
-            }
+    arguments.for_each_cell(|model, cell| {
+        let row = measure(arguments, model, cell, llvmpipe.as_ref())?;
+        println!("{}", row.text());
+        if let Some(csv) = &mut csv {
+            writeln!(csv, "{}", row.csv())?;
         }
-    }
+        rows.push(row);
+        Ok(())
+    })?;
     for is_phong in [false, true] {
         let mode: Vec<&Row> = (rows.iter())
             .filter(|row| row.cell.shading.is_phong == is_phong && row.llvmpipe.is_some())

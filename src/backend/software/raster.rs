@@ -33,7 +33,8 @@ use crate::simd::Simd;
 use fearless_simd::{Select, SimdBase, SimdInt, SimdMask};
 
 /// A small piece touches at most so many blocks along each axis: they are tried one by one in less time than it takes to find
-/// out which of them have a pixel. Of 3, 4, 5 and 7 measured, the last was fastest, by 15 % on triangles of 60 pixels.
+/// out which of them have a pixel. Of 3, 4, 5 and 7 measured, the last was fastest: frames of triangles of
+/// 15 pixels took about 9 % less time than with 3.
 const SMALL_BLOCKS: usize = 7;
 
 /// Draws a tile's triangles and counts the pixels of each.
