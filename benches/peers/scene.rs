@@ -36,7 +36,8 @@ impl Model {
     /// Reads what `make_mesh.py` writes: counts of vertices and triangles, positions and normals in turn, indices; all
     /// little endian, 32 bits each.
     pub(super) fn load(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path)?;
+        let bytes = std::fs::read(path)
+            .map_err(|error| Error::new(error.kind(), format!("{}: {error}", path.display())))?;
         let (words, _) = bytes.as_chunks::<4>();
         let bad = |what: &str| {
             Error::new(
