@@ -35,6 +35,8 @@ pub struct Allowance<'a> {
     start_ms: f64,
     reserve_ms: f64,
     spent_units: u64,
+    steps: u64,
+    is_over: bool,
 }
 
 impl<'a> Allowance<'a> {
@@ -47,6 +49,8 @@ impl<'a> Allowance<'a> {
             start_ms,
             reserve_ms: 0.0,
             spent_units: 0,
+            steps: 0,
+            is_over: false,
         }
     }
 
@@ -55,10 +59,19 @@ impl<'a> Allowance<'a> {
         self.reserve_ms = ms.max(0.0);
     }
 
-    /// Whether a piece of work of `units` nominal nanoseconds may still start. For a wall-clock budget it may while the
-    /// deadline, less the reserve and the piece's nominal time, lies ahead.
+    /// Admits a step of `units` nominal nanoseconds, or ends the frame's refinement: a wall-clock budget admits it while
+    /// the deadline, less the reserve and the step's nominal time, lies ahead.
+    ///
+    /// **After the first refusal nothing is admitted any more.** So what a frame does is the beginning of what an unlimited
+    /// one does, whatever the clock said, and the number of [`steps`](Self::steps) says how much of it.
     #[must_use]
-    pub fn admits(&self, units: u64) -> bool {
+    pub fn admit(&mut self, units: u64) -> bool {
+        self.is_over = self.is_over || !self.has_room_for(units);
+        self.steps += u64::from(!self.is_over);
+        !self.is_over
+    }
+
+    fn has_room_for(&self, units: u64) -> bool {
         match self.budget {
             Budget::Unlimited => true,
             Budget::Work(total) => self.spent_units.saturating_add(units) <= total,
@@ -78,6 +91,12 @@ impl<'a> Allowance<'a> {
             // The conversion saturates at zero.
             Budget::Millis(ms) => ((ms - self.elapsed_ms() - self.reserve_ms) * 1e6) as u64,
         }
+    }
+
+    /// How many steps were admitted.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.steps
     }
 
     /// Books `units` of finished work.
@@ -108,12 +127,25 @@ mod tests {
         let clock = ManualClock::default();
         let mut allowance = Allowance::new(Budget::from_millis(2.0), &clock, clock.now_ms());
         allowance.reserve_ms(0.5);
-        assert!(allowance.admits(1_500_000));
-        assert!(!allowance.admits(1_500_001));
+        assert!(allowance.admit(1_500_000));
         clock.advance_ms(1.5);
-        assert!(allowance.admits(0));
+        assert!(allowance.admit(0));
         clock.advance_ms(0.001);
-        assert!(!allowance.admits(0));
+        assert!(!allowance.admit(0));
+        assert_eq!(allowance.steps(), 2);
+    }
+
+    #[test]
+    fn the_first_refusal_is_the_last_word() {
+        let clock = ManualClock::default();
+        clock.advance_ms(10.0);
+        let mut allowance = Allowance::new(Budget::from_millis(2.0), &clock, clock.now_ms());
+        assert!(!allowance.admit(2_000_001));
+        assert!(!allowance.admit(1));
+        allowance = Allowance::new(Budget::Work(100), &clock, 0.0);
+        assert!(!allowance.admit(101));
+        assert!(!allowance.admit(1));
+        assert_eq!(allowance.steps(), 0);
     }
 
     #[test]
@@ -121,9 +153,9 @@ mod tests {
         let clock = ManualClock::default();
         let mut allowance = Allowance::new(Budget::Work(100), &clock, 0.0);
         clock.advance_ms(1e6);
-        assert!(allowance.admits(100));
+        assert!(allowance.admit(100));
         allowance.spend(60);
-        assert!(!allowance.admits(41));
+        assert!(!allowance.admit(41));
         assert_eq!(allowance.units_left(), 40);
     }
 

@@ -26,7 +26,7 @@ impl Refinement {
         while let Some(paint) = self.paints.front() {
             let with_next = units + u64::from(paint.units);
             let fits = units == 0 || with_next <= limit;
-            if !(fits && allowance.admits(with_next)) {
+            if !(fits && allowance.admit(with_next)) {
                 break;
             }
             units = with_next;

@@ -34,7 +34,7 @@ impl Refinement {
             }
             let more = self.planning_cost(stage, candidate, action);
             let bounds = self.bounds_cost(stage, candidate);
-            if !allowance.admits(units + more + bounds) {
+            if !allowance.admit(units + more + bounds) {
                 self.deferred.push(candidate);
                 break;
             }
