@@ -1,6 +1,170 @@
-//! How to run a pass: on which SIMD level, and on one thread or inside the engine's pool.
+//! How to run a pass: on which SIMD level, on one thread or inside the engine's pool, and for how long.
+//!
+//! A pass that may take longer than there is time for is cut into pieces of about ten microseconds. After each of them [`GoOn`] is
+//! asked; when it says no, the pass returns and keeps what it has got, and another [`Turn`] goes on from there.
 
 use crate::simd::Level;
+use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Bytes by which a list [grows](grow) at a time: memory that is new to the process takes about a microsecond for 8 KiB.
+const GROWTH_BYTES: usize = 1 << 15;
+
+/// Whether there is time for more work. Any thread may ask, at any time; what is drawn does not depend on the answers.
+pub type GoOn<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// One call of several that do some work together.
+///
+/// The first begins the work anew, whatever became of earlier work; others go on with it until it is complete. Each does at
+/// least one piece of what is left, then asks whether to go on: so the work is completed by finitely many calls, even if the
+/// answer is always no. The result is the same however many there were.
+#[derive(Clone, Copy)]
+pub struct Turn<'a> {
+    /// Whether the work begins.
+    pub is_first: bool,
+    /// Whether this call may go on.
+    pub go_on: GoOn<'a>,
+}
+
+impl fmt::Debug for Turn<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Turn")
+            .field("is_first", &self.is_first)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Turn<'static> {
+    /// The only call, which does everything.
+    pub const WHOLE: Self = Self {
+        is_first: true,
+        go_on: &|| true,
+    };
+}
+
+impl<'a> Turn<'a> {
+    /// The first call.
+    #[must_use]
+    pub fn first(go_on: GoOn<'a>) -> Self {
+        Self {
+            is_first: true,
+            go_on,
+        }
+    }
+
+    /// A later call.
+    #[must_use]
+    pub fn next(go_on: GoOn<'a>) -> Self {
+        Self {
+            is_first: false,
+            go_on,
+        }
+    }
+}
+
+/// What the threads of one call know about its end: as soon as one of them is told to stop, all do.
+pub(crate) struct Watch<'a> {
+    go_on: GoOn<'a>,
+    is_over: AtomicBool,
+}
+
+impl<'a> Watch<'a> {
+    pub(crate) fn new(go_on: GoOn<'a>) -> Self {
+        Self {
+            go_on,
+            is_over: AtomicBool::new(false),
+        }
+    }
+
+    /// Asks whether to go on after a piece of work.
+    #[inline]
+    pub(crate) fn may_go_on(&self) -> bool {
+        if self.is_over() {
+            return false;
+        }
+        let answer = (self.go_on)();
+        if !answer {
+            self.is_over.store(true, Ordering::Relaxed);
+        }
+        answer
+    }
+
+    /// Whether somebody has been told to stop.
+    #[inline]
+    pub(crate) fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed)
+    }
+}
+
+/// Asks each time that so much work has been done.
+pub(crate) struct Pace<'a> {
+    watch: &'a Watch<'a>,
+    /// Work of a piece, in units of the caller's.
+    piece: usize,
+    /// What is left to do of the current one; at least 1.
+    left: usize,
+}
+
+impl<'a> Pace<'a> {
+    pub(crate) fn new(watch: &'a Watch<'a>, piece: usize) -> Self {
+        let piece = piece.max(1);
+        Self {
+            watch,
+            piece,
+            left: piece,
+        }
+    }
+
+    /// Work left until it will be asked.
+    #[inline(always)]
+    pub(crate) fn left(&self) -> usize {
+        self.left
+    }
+
+    /// Notes work, and says whether to go on.
+    #[inline(always)]
+    pub(crate) fn did(&mut self, work: usize) -> bool {
+        if work < self.left {
+            self.left -= work;
+            return true;
+        }
+        self.left = self.piece;
+        self.watch.may_go_on()
+    }
+
+    /// Asks if there was work since it was last asked, so that many small tasks do not go on for long.
+    #[inline(always)]
+    pub(crate) fn finish(self) {
+        if self.left < self.piece {
+            self.watch.may_go_on();
+        }
+    }
+}
+
+/// Gives a list its length. Elements are made some at a time, and asked is after each of them; returns whether all are there. A list
+/// that needs more memory loses its elements; otherwise old ones stay.
+pub(crate) fn grow<T>(
+    list: &mut Vec<T>,
+    len: usize,
+    watch: &Watch<'_>,
+    mut make: impl FnMut(usize) -> T,
+) -> bool {
+    if list.capacity() < len {
+        list.clear();
+        list.reserve_exact(len);
+    }
+    list.truncate(len);
+    let some = (GROWTH_BYTES / size_of::<T>().max(1)).max(1);
+    while list.len() < len {
+        if watch.is_over() {
+            return false;
+        }
+        let first = list.len();
+        list.extend((first..len.min(first + some)).map(&mut make));
+        watch.may_go_on();
+    }
+    true
+}
 
 /// How the engine's passes run. *What* they compute never depends on it.
 #[derive(Clone, Copy, Debug)]

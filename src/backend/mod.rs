@@ -29,7 +29,7 @@ use crate::geometry::{Bary, Vec3s};
 use crate::illumination::ActiveLights;
 pub use crate::output::Interpolation;
 use crate::output::Target;
-use crate::parallel::Exec;
+use crate::parallel::{Exec, Turn};
 use crate::scene::{View, World};
 use std::fmt::Debug;
 use std::ops::Range;
@@ -164,6 +164,12 @@ pub enum Fill {
 /// `rasterize` every call gets the same geometry. `rasterize` may come again at any time, also before `resolve`.
 /// [`pending_pixels`](Self::pending_pixels) may be asked at any time.
 ///
+/// **Several calls for one image.** [`rasterize_while`](Self::rasterize_while) and [`resolve_while`](Self::resolve_while) are
+/// [turns](Turn) of what `rasterize` and `resolve` do at once, with the same results, bit for bit. Later turns of the same
+/// work come with the same geometry and paint. Until it is complete, nothing else may be asked but what begins
+/// anew: `rasterize`, or the first turn of `rasterize_while`, at any time; `resolve`, or the first turn of `resolve_while`, when
+/// the image has been rasterized.
+///
 /// **What may be assumed.** Indices are in range, `visible` is ascending and disjoint, and the view's sides are at most
 /// [`MAX_IMAGE_SIDE`](crate::geometry::screen::MAX_IMAGE_SIDE). The world's triangles and positions do not change
 /// during an image; lights, materials, normals and background may, from one `resolve` to the next. Nothing
@@ -201,6 +207,20 @@ pub trait Backend: Debug + Send {
     /// undefined until [`resolve`](Self::resolve).
     fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts;
 
+    /// One turn of [`rasterize`](Self::rasterize). `None` if it was told to stop and has not got through; then others must
+    /// follow.
+    ///
+    /// A backend that cannot stop does everything at once.
+    fn rasterize_while(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        turn: Turn<'_>,
+    ) -> Option<RasterCounts> {
+        let _ = turn;
+        Some(self.rasterize(exec, geometry))
+    }
+
     /// The triangles whose vertices have to be illuminated, ascending. With ids: those that own a pixel. Without:
     /// those that face the viewer and may touch the centre of a pixel, whether something hides
     /// them or not.
@@ -212,6 +232,22 @@ pub trait Backend: Debug + Send {
 
     /// Gives every pixel of the image its colour.
     fn resolve(&mut self, exec: Exec, geometry: Geometry<'_>, paint: BasePaint<'_>);
+
+    /// One turn of [`resolve`](Self::resolve). `false` if it was told to stop and has not got through; then others must
+    /// follow.
+    ///
+    /// A backend that cannot stop does everything at once.
+    fn resolve_while(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        paint: BasePaint<'_>,
+        turn: Turn<'_>,
+    ) -> bool {
+        let _ = turn;
+        self.resolve(exec, geometry, paint);
+        true
+    }
 
     /// With ids: paints exactly the pixels that each patch's triangle owns inside the patch, and counts them in
     /// [`Patch::pixels`]. Patches of one call must not overlap. A pixel on the border of two adjacent patches belongs
@@ -229,4 +265,9 @@ pub trait Backend: Debug + Send {
     /// Brings `target` up to the current image and marks it with its stamp; pixels known to be right already are not
     /// touched. Returns the number of pixels written, as told by [`pending_pixels`](Self::pending_pixels) just before.
     fn present(&mut self, exec: Exec, target: &mut Target<'_>) -> u64;
+
+    /// A new backend of the same kind, without an image: what it draws is the same, bit for bit. `None` if there can be only one.
+    fn sibling(&self) -> Option<Box<dyn Backend>> {
+        None
+    }
 }

@@ -21,13 +21,13 @@
 
 use super::{Backend, BasePaint, Capabilities, Geometry, Patch, RasterCounts, RefinedPart};
 use crate::output::Target;
-use crate::parallel::Exec;
+use crate::parallel::{Exec, Turn};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// One call of a method that changes something.
+/// One call of a method that changes something; of several [turns](Turn) of the same work, the one that completes it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Call {
-    /// [`Backend::rasterize`].
+    /// [`Backend::rasterize`] or [`Backend::rasterize_while`].
     Rasterize {
         /// Image width and height in pixels.
         size: [u32; 2],
@@ -36,7 +36,7 @@ pub enum Call {
         /// Triangles that were found to be visible.
         visible: Vec<u32>,
     },
-    /// [`Backend::resolve`].
+    /// [`Backend::resolve`] or [`Backend::resolve_while`].
     Resolve(Paint),
     /// [`Backend::repaint`].
     Repaint {
@@ -105,6 +105,23 @@ impl RecordingBackend {
         };
         (backend, log)
     }
+
+    fn log_rasterize(&self, geometry: Geometry<'_>, counts: RasterCounts) {
+        self.log.push(Call::Rasterize {
+            size: [geometry.view.width, geometry.view.height],
+            counts,
+            visible: self.inner.visible_triangles().to_vec(),
+        });
+    }
+
+    fn log_resolve(&self, paint: BasePaint<'_>) {
+        self.log.push(Call::Resolve(match paint {
+            BasePaint::Gouraud(_) => Paint::Gouraud,
+            BasePaint::Flat(_) => Paint::Flat,
+            BasePaint::Phong => Paint::Phong,
+            BasePaint::Refined { parts, .. } => Paint::Refined(parts.to_vec()),
+        }));
+    }
 }
 
 impl Backend for RecordingBackend {
@@ -114,12 +131,19 @@ impl Backend for RecordingBackend {
 
     fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts {
         let counts = self.inner.rasterize(exec, geometry);
-        self.log.push(Call::Rasterize {
-            size: [geometry.view.width, geometry.view.height],
-            counts,
-            visible: self.inner.visible_triangles().to_vec(),
-        });
+        self.log_rasterize(geometry, counts);
         counts
+    }
+
+    fn rasterize_while(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        turn: Turn<'_>,
+    ) -> Option<RasterCounts> {
+        let counts = self.inner.rasterize_while(exec, geometry, turn)?;
+        self.log_rasterize(geometry, counts);
+        Some(counts)
     }
 
     fn visible_triangles(&self) -> &[u32] {
@@ -131,13 +155,22 @@ impl Backend for RecordingBackend {
     }
 
     fn resolve(&mut self, exec: Exec, geometry: Geometry<'_>, paint: BasePaint<'_>) {
-        self.log.push(Call::Resolve(match paint {
-            BasePaint::Gouraud(_) => Paint::Gouraud,
-            BasePaint::Flat(_) => Paint::Flat,
-            BasePaint::Phong => Paint::Phong,
-            BasePaint::Refined { parts, .. } => Paint::Refined(parts.to_vec()),
-        }));
+        self.log_resolve(paint);
         self.inner.resolve(exec, geometry, paint);
+    }
+
+    fn resolve_while(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        paint: BasePaint<'_>,
+        turn: Turn<'_>,
+    ) -> bool {
+        let is_complete = self.inner.resolve_while(exec, geometry, paint, turn);
+        if is_complete {
+            self.log_resolve(paint);
+        }
+        is_complete
     }
 
     fn repaint(&mut self, exec: Exec, geometry: Geometry<'_>, patches: &mut [Patch]) {
@@ -156,5 +189,13 @@ impl Backend for RecordingBackend {
         let pixels = self.inner.present(exec, target);
         self.log.push(Call::Present { pixels });
         pixels
+    }
+
+    /// Writes to the same log.
+    fn sibling(&self) -> Option<Box<dyn Backend>> {
+        Some(Box::new(Self {
+            inner: self.inner.sibling()?,
+            log: self.log.clone(),
+        }))
     }
 }

@@ -8,14 +8,14 @@ use super::ActiveLights;
 use super::batch::{MAX_LANES, gather};
 use super::lanes::{ShadingKit, shade_lanes};
 use crate::geometry::Vec3s;
-use crate::parallel::Exec;
+use crate::parallel::{Exec, Pace, Turn, Watch, grow};
 use crate::scene::{Eye, World};
 use crate::simd::{Simd, dispatch};
 use fearless_simd::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Triangles that one task marks the vertices of.
-const TRIANGLES_PER_TASK: usize = 4096;
+/// Triangles that one task marks the vertices of: about 10 microseconds.
+const TRIANGLES_PER_TASK: usize = 2048;
 
 /// Vertices of a word.
 const WORD: usize = 64;
@@ -23,10 +23,34 @@ const WORD: usize = 64;
 /// Words that one task illuminates: from 10 microseconds up, with four lights.
 const WORDS_PER_TASK: usize = 8;
 
-/// A set of vertices of a world; empty between calls.
+/// What is illuminated in one go: vertices times lights, and [`VERTEX_EFFORT`] for each vertex. About 10 microseconds.
+const EFFORT_AT_ONCE: usize = 2048;
+
+/// What a vertex takes besides its lights.
+const VERTEX_EFFORT: usize = 1;
+
+/// A set of vertices of a world; empty between calls, but for turns of the same work.
 #[derive(Debug, Default)]
 pub struct VertexSet {
+    /// Vertices that have to be illuminated, one bit each.
     words: Vec<AtomicU64>,
+    /// For each task of marking, whether it is done.
+    marked: Vec<bool>,
+    stage: Stage,
+}
+
+/// What comes next for a set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Stage {
+    /// Making room.
+    Fit,
+    /// Marking the triangles' vertices.
+    Mark,
+    /// Illuminating the vertices marked.
+    Shade,
+    /// Nothing: the set is empty.
+    #[default]
+    Complete,
 }
 
 impl VertexSet {
@@ -42,12 +66,73 @@ impl VertexSet {
         triangles: &[u32],
         colours: &mut Vec3s,
     ) {
+        self.illuminate_while(exec, world, eye, triangles, colours, Turn::WHOLE);
+    }
+
+    /// One turn of [`illuminate`](Self::illuminate). `false` if it was told to stop and has not got through; then others must
+    /// follow with the same arguments, or the first of another set.
+    ///
+    /// # Panics
+    /// When a triangle is not one of the world's.
+    pub fn illuminate_while(
+        &mut self,
+        exec: Exec,
+        world: &World,
+        eye: Eye,
+        triangles: &[u32],
+        colours: &mut Vec3s,
+        turn: Turn<'_>,
+    ) -> bool {
+        let watch = &Watch::new(turn.go_on);
+        if turn.is_first {
+            self.begin(triangles);
+        }
+        if self.stage == Stage::Fit && self.fit(world, colours, watch) {
+            self.stage = Stage::Mark;
+        }
+        if self.stage == Stage::Mark && !watch.is_over() && self.mark(exec, world, triangles, watch)
+        {
+            self.stage = Stage::Shade;
+        }
+        if self.stage == Stage::Shade
+            && !watch.is_over()
+            && self.shade(exec, world, eye, colours, watch)
+        {
+            self.stage = Stage::Complete;
+        }
+        self.stage == Stage::Complete
+    }
+
+    fn begin(&mut self, triangles: &[u32]) {
+        if self.stage != Stage::Complete {
+            // It was given up.
+            for word in &mut self.words {
+                *word.get_mut() = 0;
+            }
+        }
+        self.marked.clear();
+        self.marked
+            .resize(triangles.len().div_ceil(TRIANGLES_PER_TASK), false);
+        self.stage = Stage::Fit;
+    }
+
+    /// Makes room for a world's vertices; returns whether all of it is there.
+    fn fit(&mut self, world: &World, colours: &mut Vec3s, watch: &Watch<'_>) -> bool {
         let vertices = world.positions.len();
-        self.words
-            .resize_with(vertices.div_ceil(WORD), AtomicU64::default);
-        colours.resize(vertices);
+        grow(&mut self.words, vertices.div_ceil(WORD), watch, |_| {
+            AtomicU64::default()
+        }) && grow(&mut colours.x, vertices, watch, |_| 0.0)
+            && grow(&mut colours.y, vertices, watch, |_| 0.0)
+            && grow(&mut colours.z, vertices, watch, |_| 0.0)
+    }
+
+    /// Marks vertices until it is told to stop; returns whether all are.
+    fn mark(&mut self, exec: Exec, world: &World, triangles: &[u32], watch: &Watch<'_>) -> bool {
         let words = &self.words;
-        exec.for_each_index(triangles.len().div_ceil(TRIANGLES_PER_TASK), |task| {
+        exec.for_each_chunk(&mut self.marked, 1, |task, is_marked| {
+            if is_marked[0] || watch.is_over() {
+                return;
+            }
             let first = task * TRIANGLES_PER_TASK;
             let end = triangles.len().min(first + TRIANGLES_PER_TASK);
             for &triangle in &triangles[first..end] {
@@ -55,14 +140,33 @@ impl VertexSet {
                     mark(words, vertex);
                 }
             }
+            is_marked[0] = true;
+            watch.may_go_on();
         });
-        let size = WORD * WORDS_PER_TASK;
+        self.marked.iter().all(|&is_marked| is_marked)
+    }
+
+    /// Illuminates marked vertices until it is told to stop; returns whether none are left.
+    fn shade(
+        &self,
+        exec: Exec,
+        world: &World,
+        eye: Eye,
+        colours: &mut Vec3s,
+        watch: &Watch<'_>,
+    ) -> bool {
+        let (words, size) = (&self.words, WORD * WORDS_PER_TASK);
         let out = [&mut colours.x[..], &mut colours.y[..], &mut colours.z[..]];
         exec.for_each_chunk3(out, size, |task, out| {
             let first = task * WORDS_PER_TASK;
             let end = words.len().min(first + WORDS_PER_TASK);
-            dispatch!(exec.level, simd => shade_words(simd, world, eye, &words[first..end], first * WORD, out));
+            let words = &words[first..end];
+            if watch.is_over() {
+                return;
+            }
+            dispatch!(exec.level, simd => shade_words(simd, world, eye, words, first * WORD, out, watch));
         });
+        !watch.is_over() || words.iter().all(|word| word.load(Ordering::Relaxed) == 0)
     }
 }
 
@@ -77,7 +181,8 @@ fn mark(words: &[AtomicU64], vertex: u32) {
     }
 }
 
-/// Illuminates the marked vertices of some words, the first of which begins at vertex `first`, and takes the marks off.
+/// Illuminates the marked vertices of some words, the first of which begins at vertex `first`, and takes the marks off, until it is
+/// told to stop.
 #[inline(always)]
 fn shade_words<S: Simd>(
     simd: S,
@@ -86,11 +191,14 @@ fn shade_words<S: Simd>(
     words: &[AtomicU64],
     first: usize,
     mut out: [&mut [f32]; 3],
+    watch: &Watch<'_>,
 ) {
     let lanes = S::f32s::LEN;
     let active = ActiveLights::all(world.lights.len());
     // The material illuminated last: neighbours share it as a rule.
     let mut known: Option<(u16, ShadingKit<'_>)> = None;
+    let mut pace = Pace::new(watch, EFFORT_AT_ONCE);
+    let effort = world.lights.len() + VERTEX_EFFORT;
     for (index, word) in words.iter().enumerate() {
         let bits = word.load(Ordering::Relaxed);
         if bits == 0 {
@@ -122,7 +230,11 @@ fn shade_words<S: Simd>(
                 }
             }
         }
+        if !pace.did(bits.count_ones() as usize * effort) {
+            return;
+        }
     }
+    pace.finish();
 }
 
 /// Those of some consecutive vertices that have a material.

@@ -249,6 +249,10 @@ impl Backend for SkiaBackend {
         }
         written
     }
+
+    fn sibling(&self) -> Option<Box<dyn Backend>> {
+        Some(Box::new(Self::new()))
+    }
 }
 
 /// Copies a tile into the rows that it takes part in. Pixels are opaque, so premultiplied ones are right.

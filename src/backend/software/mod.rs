@@ -5,17 +5,21 @@
 //! | pass | over | does |
 //! |---|---|---|
 //! | `transform` | blocks of vertices | pixel space, clipping planes, sub-pixel grid |
-//! | `setup` | `shares` of triangles | culls (`judge`), clips (`outline`), works out `planes`, sorts into tiles |
+//! | `setup` | `shares` of triangles | culls (`judge`), clips (`outline`), works out `planes`, sorts into `bins` |
 //! | `raster` | tiles | by `edges` and a `brush`: coverage, depth and ids, exactly as [`geometry::screen`](crate::geometry::screen) defines them; counts owners' pixels |
 //! | `visible` | shares | lists the owners |
 //! | `resolve` | tiles | colours |
 //! | `repaint` | tiles | colours of parts of triangles |
 //! | `present` | bands of tiles | copies changed tiles to a frame |
 //!
+//! All but the last two can be stopped after any piece of their work, and go on from there (`stages`, `drawing`).
+//!
 //! No pass's result depends on the number of threads, nor coverage, depth and ids on the SIMD level. All memory is kept from
 //! image to image.
 
+mod bins;
 mod brush;
+mod drawing;
 mod edges;
 mod fill;
 mod judge;
@@ -30,6 +34,7 @@ mod repaint;
 mod resolve;
 mod setup;
 mod shares;
+mod stages;
 mod tile;
 mod transform;
 mod visible;
@@ -40,11 +45,12 @@ use super::{
     Backend, BasePaint, Capabilities, Geometry, Interpolation, Patch, RasterCounts, new_writer,
 };
 use crate::output::{Stamp, Target};
-use crate::parallel::Exec;
-use crate::simd::dispatch;
+use crate::parallel::{Exec, Turn, Watch};
+use drawing::{Drawing, Spare};
 use repaint::Job;
 use resolve::Painter;
 use shares::Shares;
+use stages::Stage;
 use std::fmt;
 use tile::{Grid, TILE_SIDE, Tile};
 use transform::Vertices;
@@ -59,6 +65,13 @@ pub struct SoftwareBackend {
     serial: u64,
     grid: Grid,
     tiles: Vec<Tile>,
+    /// What comes next for the image.
+    stage: Stage,
+    /// How far the drawing of each tile is.
+    drawings: Vec<Drawing>,
+    spare: Spare,
+    /// For each tile the block that gets its colours next, or [`TILE_BLOCKS`](tile::TILE_BLOCKS) if all have them.
+    resolved: Vec<u16>,
     shares: Shares,
     vertices: Vertices,
     visible: Visible,
@@ -100,6 +113,10 @@ impl SoftwareBackend {
             serial: 0,
             grid: Grid::default(),
             tiles: Vec::new(),
+            stage: Stage::default(),
+            drawings: Vec::new(),
+            spare: Spare::default(),
+            resolved: Vec::new(),
             shares: Shares::default(),
             vertices: Vertices::default(),
             visible: Visible::default(),
@@ -107,7 +124,8 @@ impl SoftwareBackend {
         }
     }
 
-    /// The owner of every pixel, row after row, [`NO_TRIANGLE`] where there is none; `out` is overwritten.
+    /// The owner of every pixel, row after row, [`NO_TRIANGLE`] where there is none; `out` is overwritten. Nothing while an image
+    /// is not complete.
     pub fn ids(&self, out: &mut Vec<u32>) {
         out.clear();
         out.extend(self.slots().map(|(slot, _)| match slot {
@@ -116,7 +134,8 @@ impl SoftwareBackend {
         }));
     }
 
-    /// The reversed depth of every pixel, row after row, 0 where nothing is; `out` is overwritten.
+    /// The reversed depth of every pixel, row after row, 0 where nothing is; `out` is overwritten. Nothing while an image is not
+    /// complete.
     pub fn depths(&self, out: &mut Vec<f32>) {
         out.clear();
         out.extend(self.slots().map(|(slot, [x, y])| match slot {
@@ -127,7 +146,10 @@ impl SoftwareBackend {
 
     /// Slots and places of all pixels, row after row.
     fn slots(&self) -> impl Iterator<Item = (u32, [i32; 2])> {
-        let grid = self.grid;
+        let grid = match self.stage {
+            Stage::Complete => self.grid,
+            _ => Grid::default(),
+        };
         (0..grid.height as usize).flat_map(move |y| {
             (0..grid.width as usize).map(move |x| {
                 let tile = &self.tiles[y / TILE_SIDE * grid.columns + x / TILE_SIDE];
@@ -135,67 +157,6 @@ impl SoftwareBackend {
                 (slot, [x as i32, y as i32])
             })
         })
-    }
-
-    /// Makes room for a view's image.
-    fn fit(&mut self, geometry: Geometry<'_>) {
-        let grid = Grid::new(geometry.view.width, geometry.view.height);
-        if grid != self.grid {
-            self.serial += 1;
-            self.tiles = grid.tiles(self.serial);
-            self.grid = grid;
-        }
-    }
-
-    /// The first step of [`rasterize`](Backend::rasterize), public for benchmarks only, as are the others: makes room for the
-    /// image, cuts triangles into shares, and transforms their vertices. None may be left out.
-    #[doc(hidden)]
-    pub fn transform(&mut self, exec: Exec, geometry: Geometry<'_>) {
-        self.fit(geometry);
-        self.shares.cut(geometry);
-        self.vertices
-            .transform(exec, geometry, self.shares.used_mut());
-    }
-
-    /// The second step: what there is to draw, sorted into tiles.
-    #[doc(hidden)]
-    pub fn set_up(&mut self, exec: Exec, geometry: Geometry<'_>) {
-        let (grid, vertices) = (self.grid, &self.vertices);
-        exec.for_each_chunk(self.shares.used_mut(), 1, |_, share| {
-            dispatch!(exec.level, simd => setup::set_up(simd, &mut share[0], geometry, grid, vertices));
-        });
-    }
-
-    /// The third step: who owns which pixel. Each time it adds to the counts of pixels, which the second step begins anew.
-    #[doc(hidden)]
-    pub fn draw(&mut self, exec: Exec) {
-        let shares = self.shares.used();
-        exec.for_each_chunk(&mut self.tiles, 1, |index, tile| {
-            dispatch!(exec.level, simd => raster::draw_tile(simd, &mut tile[0], index, shares));
-        });
-    }
-
-    /// The last step: who owns any.
-    #[doc(hidden)]
-    pub fn list_owners(&mut self, exec: Exec, geometry: Geometry<'_>) {
-        let triangles = geometry.world.triangles.len();
-        self.visible.list(exec, &mut self.shares, triangles);
-    }
-
-    fn counts(&self) -> RasterCounts {
-        let mut counts = RasterCounts::default();
-        for share in self.shares.used() {
-            counts.submitted += share.counts.submitted;
-            counts.back_facing += share.counts.back_facing;
-            counts.off_screen += share.counts.off_screen;
-            counts.clipped += share.counts.clipped;
-            counts.drawn += share.counts.drawn;
-        }
-        for tile in &self.tiles {
-            counts.covered_pixels += u64::from(tile.covered);
-            counts.background_tiles += u64::from(tile.covered == 0);
-        }
-        counts
     }
 }
 
@@ -209,11 +170,21 @@ impl Backend for SoftwareBackend {
     }
 
     fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts {
-        self.transform(exec, geometry);
-        self.set_up(exec, geometry);
-        self.draw(exec);
-        self.list_owners(exec, geometry);
-        self.counts()
+        self.rasterize_while(exec, geometry, Turn::WHOLE)
+            .unwrap_or_default()
+    }
+
+    fn rasterize_while(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        turn: Turn<'_>,
+    ) -> Option<RasterCounts> {
+        if turn.is_first {
+            self.begin_image(geometry);
+        }
+        let is_complete = self.run_stages(exec, geometry, &Watch::new(turn.go_on));
+        is_complete.then(|| self.counts())
     }
 
     fn visible_triangles(&self) -> &[u32] {
@@ -225,15 +196,20 @@ impl Backend for SoftwareBackend {
     }
 
     fn resolve(&mut self, exec: Exec, geometry: Geometry<'_>, paint: BasePaint<'_>) {
-        self.serial += 1;
-        let painter = Painter {
-            geometry,
-            shares: &self.shares,
-            serial: self.serial,
-        };
-        exec.for_each_chunk(&mut self.tiles, 1, |index, tile| {
-            dispatch!(exec.level, simd => resolve::resolve_tile(simd, &mut tile[0], index, &painter, paint));
-        });
+        self.resolve_while(exec, geometry, paint, Turn::WHOLE);
+    }
+
+    fn resolve_while(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        paint: BasePaint<'_>,
+        turn: Turn<'_>,
+    ) -> bool {
+        if turn.is_first {
+            self.resolved.fill(0);
+        }
+        self.colour_tiles(exec, geometry, paint, &Watch::new(turn.go_on))
     }
 
     fn repaint(&mut self, exec: Exec, geometry: Geometry<'_>, patches: &mut [Patch]) {
@@ -277,5 +253,9 @@ impl Backend for SoftwareBackend {
             serial: self.serial,
         };
         present::present(exec, self.grid, &self.tiles, now, target)
+    }
+
+    fn sibling(&self) -> Option<Box<dyn Backend>> {
+        Some(Box::new(Self::new()))
     }
 }

@@ -22,13 +22,11 @@
 )]
 
 use super::brush::{Brush, MOST_PARTS, PixelPlaces};
+use super::drawing::{Desk, Drawing, Layers, Next};
 use super::edges::{BlockEdge, BlockRange, TileEdges, is_inner, small_edges};
 use super::setup::Piece;
 use super::shares::{Share, add_pixels};
-use super::tile::{
-    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, BlockSet, NO_DEPTH, NO_TRIANGLE, TILE_BLOCKS,
-    TILE_PIXELS, Tile,
-};
+use super::tile::{BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, NO_DEPTH, NO_TRIANGLE, Tile};
 use crate::simd::Simd;
 use fearless_simd::{Select, SimdBase, SimdInt, SimdMask};
 
@@ -37,46 +35,67 @@ use fearless_simd::{Select, SimdBase, SimdInt, SimdMask};
 /// 15 pixels took about 9 % less time than with 3.
 const SMALL_BLOCKS: usize = 7;
 
-/// Draws a tile's triangles and counts the pixels of each.
+/// What is drawn of a tile in one go, in [`effort`](Canvas::effort): about 10 microseconds.
+const EFFORT_AT_ONCE: usize = 2048;
+
+/// Effort of a piece besides its blocks.
+const EFFORT_OF_PIECE: usize = 8;
+
+/// Draws a tile's triangles and counts the pixels of each, or goes on with it, until it is told to stop.
 #[inline(always)]
-pub(super) fn draw_tile<S: Simd>(simd: S, tile: &mut Tile, index: usize, shares: &[Share]) {
-    tile.owned = BlockSet::default();
-    tile.covered = 0;
-    let mut pieces = shares.iter().flat_map(|share| share.bin(index)).peekable();
-    if pieces.peek().is_none() {
-        return;
-    }
+pub(super) fn draw_tile<S: Simd>(
+    simd: S,
+    tile: &mut Tile,
+    index: usize,
+    shares: &[Share],
+    drawing: &mut Drawing,
+    desk: &Desk<'_>,
+) {
     let mut canvas = Canvas {
-        depth: [NO_DEPTH; TILE_PIXELS],
-        slot: [NO_TRIANGLE; TILE_PIXELS],
-        farthest: [NO_DEPTH; TILE_BLOCKS],
-        owned: BlockSet::default(),
+        layers: Layers::EMPTY,
         origin: tile.origin,
         size: [tile.width, tile.height],
         places: PixelPlaces::new(simd),
+        effort: 0,
     };
-    for piece in pieces {
-        canvas.draw(simd, piece);
+    let mut next = Next::default();
+    if let Drawing::Unfinished(unfinished) = drawing {
+        canvas.layers.clone_from(&unfinished.layers);
+        next = unfinished.next;
     }
-    hand_over(simd, &canvas, tile, shares);
+    while let Some(share) = shares.get(next.share) {
+        let bin = share.bin(index);
+        for &entry in &bin[next.entry..] {
+            canvas.draw(simd, &share.pieces[entry as usize]);
+            next.entry += 1;
+            if canvas.effort >= EFFORT_AT_ONCE {
+                canvas.effort = 0;
+                if !desk.watch.may_go_on() {
+                    drawing.set_aside(desk, &canvas.layers, next);
+                    return;
+                }
+            }
+        }
+        next = Next {
+            share: next.share + 1,
+            entry: 0,
+        };
+    }
+    hand_over(simd, &canvas.layers, tile, shares);
+    drawing.finish(desk);
 }
 
 /// A tile that is being drawn, on the stack of the thread that draws it and in its caches: waiting for the tile's own memory
 /// would take longer than drawing.
 struct Canvas<S: Simd> {
-    /// Reversed depth of each pixel, or [`NO_DEPTH`].
-    depth: [f32; TILE_PIXELS],
-    /// The slot of the triangle that owns each pixel, or [`NO_TRIANGLE`].
-    slot: [u32; TILE_PIXELS],
-    /// A depth that no pixel of a block is farther than.
-    farthest: [f32; TILE_BLOCKS],
-    /// Blocks in which some pixel has a triangle.
-    owned: BlockSet,
+    layers: Layers,
     /// The image pixel in the top left corner.
     origin: [i32; 2],
     /// Columns and rows inside the image.
     size: [i32; 2],
     places: PixelPlaces<S>,
+    /// About what has been done: the number of blocks looked at, and [`EFFORT_OF_PIECE`] for each piece.
+    effort: usize,
 }
 
 impl<S: Simd> Canvas<S> {
@@ -90,6 +109,7 @@ impl<S: Simd> Canvas<S> {
             x1: block(pixels.x1),
             y1: block(pixels.y1),
         };
+        self.effort += (range.x1 - range.x0 + 1) * (range.y1 - range.y0 + 1) + EFFORT_OF_PIECE;
         let is_small = range.x1 - range.x0 < SMALL_BLOCKS && range.y1 - range.y0 < SMALL_BLOCKS;
         if is_small && is_inner(self.size) {
             let [left, top] = [range.x0, range.y0].map(|block| (block * BLOCK_SIDE) as i32);
@@ -129,7 +149,7 @@ impl<S: Simd> Canvas<S> {
         }
         for y in range.y0..=range.y1 {
             let row_depths = brush.row_depths(simd, &self.places, y);
-            let mut owned = self.owned.row(y);
+            let mut owned = self.layers.owned.row(y);
             let (mut values, mut columns) = (row_values, columns);
             for x in range.x0..=range.x1 {
                 let mut inside = [S::mask32s::splat(simd, true); MOST_PARTS];
@@ -146,7 +166,7 @@ impl<S: Simd> Canvas<S> {
                 }
                 self.put(simd, brush.slot, [x, y], inside, depths, &mut owned);
             }
-            self.owned.insert_row(y, owned);
+            self.layers.owned.insert_row(y, owned);
             for k in 0..3 {
                 for part in 0..parts {
                     row_values[k][part] += edges[k].dy * side;
@@ -179,7 +199,7 @@ impl<S: Simd> Canvas<S> {
                 let [some, all] = brush.coverage(simd, &values, right);
                 let [least, most] = brush.depth_ranges(simd, [first, y]);
                 let at = y * BLOCKS_ACROSS + first;
-                let farthest = S::f32s::from_slice(simd, &self.farthest[at..at + width]);
+                let farthest = S::f32s::from_slice(simd, &self.layers.farthest[at..at + width]);
                 // What is nowhere strictly nearer loses.
                 let drawn =
                     (some & most.simd_gt(farthest)).to_bitmask() & range.columns_from(first);
@@ -188,9 +208,9 @@ impl<S: Simd> Canvas<S> {
                     let filled = S::mask32s::from_bitmask(simd, full);
                     filled
                         .select(least.max(farthest), farthest)
-                        .store_slice(&mut self.farthest[at..at + width]);
+                        .store_slice(&mut self.layers.farthest[at..at + width]);
                 }
-                let mut owned = self.owned.row(y);
+                let mut owned = self.layers.owned.row(y);
                 // One kind after the other, so that branches can be predicted.
                 let mut left = drawn & !full;
                 while left != 0 {
@@ -212,7 +232,7 @@ impl<S: Simd> Canvas<S> {
                     let inside = [S::mask32s::splat(simd, true); MOST_PARTS];
                     self.draw_block(simd, &brush, &row_depths, place, inside, &mut owned);
                 }
-                self.owned.insert_row(y, owned);
+                self.layers.owned.insert_row(y, owned);
             }
         }
     }
@@ -254,8 +274,8 @@ impl<S: Simd> Canvas<S> {
         let mut any = 0;
         for part in 0..PixelPlaces::<S>::parts() {
             let at = first + part * width;
-            let depth = &mut self.depth[at..at + width];
-            let owner = &mut self.slot[at..at + width];
+            let depth = &mut self.layers.depth[at..at + width];
+            let owner = &mut self.layers.slot[at..at + width];
             let stored = S::f32s::from_slice(simd, depth);
             // A maximum, since compilers make a masked store of a selection, which some processors take ten times as long for.
             let offered = inside[part].select(depths[part], nothing);
@@ -271,15 +291,15 @@ impl<S: Simd> Canvas<S> {
 
 /// Copies the owned blocks to the tile, and counts the covered pixels and those of each triangle.
 #[inline(always)]
-fn hand_over<S: Simd>(simd: S, canvas: &Canvas<S>, tile: &mut Tile, shares: &[Share]) {
+fn hand_over<S: Simd>(simd: S, layers: &Layers, tile: &mut Tile, shares: &[Share]) {
     let width = S::u32s::LEN;
     let mut covered = 0;
     // A large triangle fills block after block.
     let (mut last, mut count) = (NO_TRIANGLE, 0);
-    for block in canvas.owned.iter() {
+    for block in layers.owned.iter() {
         for part in 0..BLOCK_PIXELS / width {
             let at = block * BLOCK_PIXELS + part * width;
-            let slots = &canvas.slot[at..at + width];
+            let slots = &layers.slot[at..at + width];
             let vector = S::u32s::from_slice(simd, slots);
             vector.store_slice(&mut tile.slot[at..at + width]);
             let mut left = vector.simd_ne(NO_TRIANGLE).to_bitmask();
@@ -302,5 +322,5 @@ fn hand_over<S: Simd>(simd: S, canvas: &Canvas<S>, tile: &mut Tile, shares: &[Sh
         add_pixels(shares, last, count);
     }
     tile.covered = covered;
-    tile.owned = canvas.owned;
+    tile.owned = layers.owned;
 }

@@ -11,11 +11,14 @@
 use super::lanes::{Corners3, Lanes3, gather, interpolate, select3, splat3, weights_at};
 use super::setup::Drawn;
 use super::shares::Shares;
-use super::tile::{BLOCK_PIXELS, BLOCK_SIDE, NO_TRIANGLE, Tile, block_corner};
+use super::tile::{
+    BLOCK_PIXELS, BLOCK_SIDE, BlockSet, NO_TRIANGLE, TILE_BLOCKS, Tile, block_corner,
+};
 use crate::backend::{BasePaint, Geometry};
 use crate::geometry::Vec3s;
 use crate::illumination::{ActiveLights, ShadingKit, shade_lanes};
 use crate::output::encode::encode_lanes;
+use crate::parallel::{Pace, Watch};
 use crate::scene::World;
 use crate::simd::Simd;
 use fearless_simd::{SimdBase, SimdInt, SimdMask};
@@ -53,7 +56,14 @@ impl<'a> Painter<'a> {
     }
 }
 
-/// Paints a tile.
+/// Blocks that are painted in one go: with interpolated colours about 10 microseconds on a fine mesh.
+const BLOCKS_AT_ONCE: usize = 64;
+
+/// The same with the illumination equation at every pixel, times lights.
+const LIT_BLOCKS_AT_ONCE: usize = 96;
+
+/// Paints a tile, or goes on with it, until it is told to stop. `next` is the block to go on with: 0 at first, [`TILE_BLOCKS`]
+/// when the tile is complete.
 #[inline(always)]
 pub(super) fn resolve_tile<S: Simd>(
     simd: S,
@@ -61,15 +71,23 @@ pub(super) fn resolve_tile<S: Simd>(
     index: usize,
     painter: &Painter<'_>,
     paint: BasePaint<'_>,
+    next: &mut u16,
+    watch: &Watch<'_>,
 ) {
-    let encoding = painter.geometry.view.encoding;
-    let background = encode_lanes(simd, encoding, splat3(simd, painter.world().background));
-    fill_background(tile, background[0], painter.serial);
-    if tile.owned.is_empty() {
+    if *next == 0 {
+        let encoding = painter.geometry.view.encoding;
+        let background = encode_lanes(simd, encoding, splat3(simd, painter.world().background));
+        fill_background(tile, background[0], painter.serial);
+        if !tile.owned.is_empty() {
+            painter.shares.prefetch(index);
+        }
+    }
+    let left = tile.owned.from(usize::from(*next));
+    if left.is_empty() {
+        *next = TILE_BLOCKS as u16;
         return;
     }
-    painter.shares.prefetch(index);
-    match paint {
+    let end = match paint {
         // Parts are for backends that cannot repaint.
         BasePaint::Gouraud(colours) | BasePaint::Refined { colours, .. } => {
             let mut gouraud = Gouraud {
@@ -78,21 +96,39 @@ pub(super) fn resolve_tile<S: Simd>(
                 last: NO_TRIANGLE,
                 corners: Corners3::default(),
             };
-            paint_tile(simd, tile, painter, &mut gouraud);
+            let pace = Pace::new(watch, BLOCKS_AT_ONCE);
+            paint_tile(simd, tile, painter, &mut gouraud, left, pace)
         }
         BasePaint::Flat(colours) => {
-            paint_tile(simd, tile, painter, &mut Flat { painter, colours });
+            let pace = Pace::new(watch, BLOCKS_AT_ONCE);
+            paint_tile(
+                simd,
+                tile,
+                painter,
+                &mut Flat { painter, colours },
+                left,
+                pace,
+            )
         }
         BasePaint::Phong => {
-            let active = ActiveLights::all(painter.world().lights.len());
+            let lights = painter.world().lights.len();
             let mut phong = Phong {
                 painter,
-                active,
+                active: ActiveLights::all(lights),
                 kit: None,
             };
-            paint_tile(simd, tile, painter, &mut phong);
+            let some = BLOCKS_AT_ONCE.min(LIT_BLOCKS_AT_ONCE / (1 + lights));
+            paint_tile(
+                simd,
+                tile,
+                painter,
+                &mut phong,
+                left,
+                Pace::new(watch, some),
+            )
         }
-    }
+    };
+    *next = end as u16;
 }
 
 /// Gives blocks that no triangle has a pixel of the background's colour, unless they have it already.
@@ -151,19 +187,23 @@ trait Surface {
     ) -> Lanes3<S>;
 }
 
+/// Paints some blocks of a tile until it is told to stop. Returns the block to go on with, or [`TILE_BLOCKS`].
 #[inline(always)]
 fn paint_tile<S: Simd>(
     simd: S,
     tile: &mut Tile,
     painter: &Painter<'_>,
     surface: &mut impl Surface,
-) {
+    blocks: BlockSet,
+    mut pace: Pace<'_>,
+) -> usize {
     let lanes = S::u32s::LEN;
     let background = splat3(simd, painter.world().background);
     let encoding = painter.geometry.view.encoding;
     let iota = S::i32s::from_fn(simd, |i| i as i32);
     let mut changed = S::mask32s::splat(simd, false);
-    for block in tile.owned.iter() {
+    let mut next = TILE_BLOCKS;
+    for block in blocks.iter() {
         let [x, y] = block_corner(block);
         let corner = [(tile.origin[0] + x) as f32, (tile.origin[1] + y) as f32];
         for part in 0..BLOCK_PIXELS / lanes {
@@ -186,10 +226,15 @@ fn paint_tile<S: Simd>(
             changed |= colour.simd_ne(S::u32s::from_slice(simd, stored));
             colour.store_slice(stored);
         }
+        if !pace.did(1) {
+            next = block + 1;
+            break;
+        }
     }
     if changed.any_true() {
         tile.serial = painter.serial;
     }
+    next
 }
 
 /// Vertex colours, interpolated.

@@ -1,4 +1,4 @@
-//! Triangle set-up: culling, clipping, and what the tiles need to draw and to colour a triangle; then binning.
+//! Triangle set-up: culling, clipping, and what the tiles need to draw and to colour a triangle; then [binning](super::bins).
 //!
 //! A triangle is dropped when all its corners are outside of one clipping plane, when its snapped area says that it faces
 //! away, or when no pixel centre lies in its box, or in itself if the box holds few. That is found out (see [`judge`](super::judge)) for a batch of consecutive triangles at a time; the planes of
@@ -8,20 +8,18 @@
 //! fan of pieces. The fan faces the way its whole snapped area says; single pieces that rounding
 //! turned the other way are left out. Planes come from the unclipped triangle, anchored at the top left pixel of the box of
 //! everything that is left of it, so that all pieces agree.
-//!
-//! Bins are made for each share of triangles by itself (a counting sort by tile), and a tile looks into every share's bin in
-//! turn: nothing is merged, and each bin lists its triangles in ascending order.
 
-use super::fit;
+use super::bins;
 use super::judge::{BATCH, Batch, PixelRanges, Verdicts};
 use super::outline::Outline;
 use super::planes::{Corners, TRIANGLES};
-use super::shares::Share;
+use super::shares::{Progress, Share};
 use super::tile::{Bounds, Grid};
 use super::transform::Vertices;
 use crate::backend::Geometry;
 use crate::geometry::screen::{DepthPlane, Interpolator, PixelBox, TrianglePlanes, doubled_area};
 use crate::math::PixelPoint;
+use crate::parallel::{Pace, Watch};
 use crate::simd::Simd;
 use fearless_simd::prelude::*;
 
@@ -79,7 +77,10 @@ pub(super) fn corners(vertices: &Vertices, triangle: [u32; 3]) -> [PixelPoint; 3
     ]
 }
 
-/// Sets up and bins a share's triangles.
+/// Triangles that are set up in one go: about 10 microseconds.
+const SET_UP_AT_ONCE: usize = 512;
+
+/// Sets up and bins a share's triangles, or goes on with it, until it is told to stop.
 #[inline(always)]
 pub(super) fn set_up<S: Simd>(
     simd: S,
@@ -87,23 +88,20 @@ pub(super) fn set_up<S: Simd>(
     geometry: Geometry<'_>,
     grid: Grid,
     vertices: &Vertices,
+    watch: &Watch<'_>,
 ) {
-    let setup = Setup {
-        geometry,
-        grid,
-        vertices,
-    };
-    share.clear();
-    let mut pending = Pending::new();
-    for range in share.ranges(geometry) {
-        let first = range.start;
-        for (index, triangles) in geometry.world.triangles[range].chunks(BATCH).enumerate() {
-            let first = (first + index * BATCH) as u32;
-            setup.batch(simd, share, &mut pending, first, triangles);
+    if share.progress == Progress::Triangles {
+        let setup = Setup {
+            geometry,
+            grid,
+            vertices,
+        };
+        if !setup.triangles(simd, share, watch) {
+            return;
         }
+        bins::begin(share, grid);
     }
-    setup.flush(simd, share, &mut pending);
-    bin(share, grid);
+    bins::fill(share, grid, watch);
 }
 
 /// What set-up reads.
@@ -114,6 +112,25 @@ struct Setup<'a> {
 }
 
 impl Setup<'_> {
+    /// Sets up what is left of a share's triangles; returns whether nothing is left.
+    #[inline(always)]
+    fn triangles<S: Simd>(&self, simd: S, share: &mut Share, watch: &Watch<'_>) -> bool {
+        let mut pending = Pending::new();
+        let mut pace = Pace::new(watch, SET_UP_AT_ONCE);
+        let mut goes_on = true;
+        while goes_on && let Some(ids) = share.rest.take(self.geometry, pace.left()) {
+            let (first, count) = (ids.start, ids.len());
+            let triangles = &self.geometry.world.triangles[ids];
+            for (index, triangles) in triangles.chunks(BATCH).enumerate() {
+                let first = (first + index * BATCH) as u32;
+                self.batch(simd, share, &mut pending, first, triangles);
+            }
+            goes_on = pace.did(count);
+        }
+        self.flush(simd, share, &mut pending);
+        goes_on
+    }
+
     /// Sets up consecutive triangles, the first of which is number `first`.
     #[inline(always)]
     fn batch<S: Simd>(
@@ -285,30 +302,5 @@ impl Pending {
             bounds: bounds.into(),
         };
         self.len += 1;
-    }
-}
-
-/// Sorts a share's pieces by the tiles that their boxes touch.
-fn bin(share: &mut Share, grid: Grid) {
-    let starts = &mut share.bin_starts;
-    starts.clear();
-    // Each tile's count goes one place to the right of its start, twice over: after summing up, a place holds its tile's
-    // start, which filling then moves on to the end, that is, to the next tile's start.
-    starts.resize(grid.len() + 2, 0);
-    for piece in &share.pieces {
-        for tile in grid.touched(&piece.bounds) {
-            starts[tile + 2] += 1;
-        }
-    }
-    for i in 2..starts.len() {
-        starts[i] += starts[i - 1];
-    }
-    fit(&mut share.bin_entries, starts[starts.len() - 1] as usize, 0);
-    for (index, piece) in share.pieces.iter().enumerate() {
-        for tile in grid.touched(&piece.bounds) {
-            let next = &mut starts[tile + 1];
-            share.bin_entries[*next as usize] = index as u32;
-            *next += 1;
-        }
     }
 }

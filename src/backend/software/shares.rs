@@ -11,6 +11,7 @@ use super::setup::{Drawn, Piece};
 use super::tile::Bounds;
 use crate::backend::{Geometry, RasterCounts};
 use crate::geometry::screen::DepthPlane;
+use crate::parallel::Watch;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -25,17 +26,69 @@ const PLACE_BITS: u32 = 26;
 /// Set in a triangle's count of pixels if several tiles may add to it.
 const IN_SEVERAL_TILES: u32 = 1 << 31;
 
+/// Some consecutive visible triangles.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Triangles {
+    /// The range in `Geometry::visible` that holds the first triangle.
+    range: usize,
+    /// Triangles of that range that come before it.
+    skip: u64,
+    /// Number of triangles.
+    count: u64,
+}
+
+impl Triangles {
+    /// Takes away the first of them, at most `most`, and returns their ids; `None` when there are none.
+    #[inline]
+    pub(super) fn take(&mut self, geometry: Geometry<'_>, most: usize) -> Option<Range<usize>> {
+        while self.count > 0 {
+            let range = geometry.visible.get(self.range)?;
+            let available = length(range).saturating_sub(self.skip);
+            if available == 0 {
+                self.range += 1;
+                self.skip = 0;
+                continue;
+            }
+            let taken = available.min(self.count).min(most as u64);
+            let start = u64::from(range.start) + self.skip;
+            self.skip += taken;
+            self.count -= taken;
+            return Some(start as usize..(start + taken) as usize);
+        }
+        None
+    }
+}
+
+/// How far the set-up of a share is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Progress {
+    /// Triangles are set up.
+    #[default]
+    Triangles,
+    /// Entries of the bins are counted; those of so many pieces have been.
+    Counting(usize),
+    /// Entries are put into the bins, likewise.
+    Filling(usize),
+    /// It is complete.
+    Done,
+}
+
+/// Drawn triangles that are asked whether they own pixels in one go.
+const LISTED_AT_ONCE: usize = 2048;
+
 /// Some consecutive visible triangles, and what set-up makes of them.
 #[derive(Debug, Default)]
 pub(super) struct Share {
     /// Its number.
     index: u32,
-    /// The range in `Geometry::visible` that holds the first triangle.
-    range: usize,
-    /// Triangles of that range that belong to earlier shares.
-    skip: u64,
-    /// Number of triangles.
-    count: u64,
+    /// Its triangles.
+    all: Triangles,
+    /// Those of them that the current pass has not yet come to.
+    pub rest: Triangles,
+    /// How far set-up is.
+    pub progress: Progress,
+    /// How many of `drawn` have been asked whether they own pixels.
+    listed: usize,
     /// Triangles to be drawn, ascending by id, each at its place.
     pub drawn: Vec<Drawn>,
     /// How many pixels each of them owns, once the tiles have been drawn; and [`IN_SEVERAL_TILES`].
@@ -64,27 +117,15 @@ impl Share {
         }
     }
 
-    /// The ids of its triangles, ascending, as ranges that are not empty.
-    #[inline]
-    pub(super) fn ranges<'a>(
-        &self,
-        geometry: Geometry<'a>,
-    ) -> impl Iterator<Item = Range<usize>> + use<'a> {
-        let (mut skip, mut left) = (self.skip, self.count);
-        geometry.visible[self.range..]
-            .iter()
-            .map_while(move |range| {
-                let start = u64::from(range.start) + skip;
-                let end = u64::from(range.end).min(start + left).max(start);
-                let is_needed = left > 0;
-                (skip, left) = (0, left - (end - start));
-                is_needed.then_some(start as usize..end as usize)
-            })
-            .filter(|range| !range.is_empty())
+    /// Begins a pass over its triangles.
+    pub(super) fn rewind(&mut self) {
+        self.rest = self.all;
     }
 
-    /// Forgets what the last image made of its triangles.
-    pub(super) fn clear(&mut self) {
+    /// Begins its set-up: forgets what the last image made of its triangles.
+    pub(super) fn begin_set_up(&mut self) {
+        self.rewind();
+        self.progress = Progress::Triangles;
         self.drawn.clear();
         self.pixels.clear();
         self.pieces.clear();
@@ -131,25 +172,40 @@ impl Share {
         self.index << PLACE_BITS | self.drawn.len() as u32
     }
 
-    /// The pieces in a tile's bin.
+    /// The pieces in a tile's bin, as indices.
     #[inline]
-    pub(super) fn bin(&self, tile: usize) -> impl Iterator<Item = &Piece> {
+    pub(super) fn bin(&self, tile: usize) -> &[u32] {
         let (start, end) = (self.bin_starts[tile], self.bin_starts[tile + 1]);
-        self.bin_entries[start as usize..end as usize]
-            .iter()
-            .map(|&entry| &self.pieces[entry as usize])
+        &self.bin_entries[start as usize..end as usize]
     }
 
-    /// Lists the triangles that own pixels, and notes their slots by their ids.
-    pub(super) fn list_visible(&mut self, slot_of: &[AtomicU32]) {
+    /// Begins to list the triangles that own pixels.
+    pub(super) fn begin_list(&mut self) {
         self.visible.clear();
-        let first = self.index << PLACE_BITS;
-        for ((drawn, pixels), slot) in self.drawn.iter().zip(&self.pixels).zip(first..) {
-            if pixels.load(Ordering::Relaxed) & !IN_SEVERAL_TILES > 0 {
-                self.visible.push(drawn.id);
-                slot_of[drawn.id as usize].store(slot, Ordering::Relaxed);
+        self.listed = 0;
+    }
+
+    /// Lists the triangles that own pixels, and notes their slots by their ids, until it is told to stop.
+    pub(super) fn list_visible(&mut self, slot_of: &[AtomicU32], watch: &Watch<'_>) {
+        while !self.is_listed() && !watch.is_over() {
+            let end = self.drawn.len().min(self.listed + LISTED_AT_ONCE);
+            let some = self.listed..end;
+            let slots = (self.index << PLACE_BITS | self.listed as u32)..;
+            let counted = self.drawn[some.clone()].iter().zip(&self.pixels[some]);
+            for ((drawn, pixels), slot) in counted.zip(slots) {
+                if pixels.load(Ordering::Relaxed) & !IN_SEVERAL_TILES > 0 {
+                    self.visible.push(drawn.id);
+                    slot_of[drawn.id as usize].store(slot, Ordering::Relaxed);
+                }
             }
+            self.listed = end;
+            watch.may_go_on();
         }
+    }
+
+    /// Whether all triangles that own pixels have been listed.
+    pub(super) fn is_listed(&self) -> bool {
+        self.listed == self.drawn.len()
     }
 }
 
@@ -215,8 +271,9 @@ impl Shares {
     pub(super) fn prefetch(&self, tile: usize) {
         let mut sum = 0_u32;
         for share in self.used() {
-            for piece in share.bin(tile) {
-                sum = sum.wrapping_add(share.drawn[place(piece.slot)].id);
+            for &entry in share.bin(tile) {
+                let slot = share.pieces[entry as usize].slot;
+                sum = sum.wrapping_add(share.drawn[place(slot)].id);
             }
         }
         // Otherwise nothing would be loaded.
@@ -261,11 +318,11 @@ fn length(range: &Range<u32>) -> u64 {
 fn cut_into(shares: &mut [Share], geometry: Geometry<'_>, size: u64, total: u64) {
     let (mut range, mut skip, mut left) = (0, 0, total);
     for share in shares {
-        share.range = range;
-        share.skip = skip;
-        share.count = size.min(left);
-        left -= share.count;
-        let mut taken = share.count;
+        let count = size.min(left);
+        share.all = Triangles { range, skip, count };
+        share.rewind();
+        left -= count;
+        let mut taken = count;
         while let Some(available) = geometry.visible.get(range).map(|r| length(r) - skip)
             && available <= taken
         {
@@ -314,13 +371,14 @@ mod tests {
                 visible: &visible,
             };
             shares.cut(geometry);
-            let used = shares.used();
-            assert!(used.len() as u64 <= MOST_SHARES);
-            let got: Vec<_> = used
-                .iter()
-                .flat_map(|s| s.ranges(geometry))
-                .flatten()
-                .collect();
+            assert!(shares.used().len() as u64 <= MOST_SHARES);
+            let mut got = Vec::new();
+            for share in shares.used_mut() {
+                while let Some(ids) = share.rest.take(geometry, 300) {
+                    assert!((1..=300).contains(&ids.len()), "{ids:?}");
+                    got.extend(ids);
+                }
+            }
             let want: Vec<_> = visible
                 .iter()
                 .cloned()

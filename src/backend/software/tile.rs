@@ -59,6 +59,9 @@ pub(super) fn block_corner(block: usize) -> [i32; 2] {
 pub(super) struct BlockSet([u64; 4]);
 
 impl BlockSet {
+    /// No blocks.
+    pub(super) const EMPTY: Self = Self([0; 4]);
+
     /// Adds blocks of a row, one bit for each column.
     #[inline(always)]
     pub(super) fn insert_row(&mut self, row: usize, columns: u64) {
@@ -83,6 +86,15 @@ impl BlockSet {
     #[inline]
     pub(super) fn without(self, other: Self) -> Self {
         Self(std::array::from_fn(|word| self.0[word] & !other.0[word]))
+    }
+
+    /// The blocks from number `first` on.
+    #[inline]
+    pub(super) fn from(self, first: usize) -> Self {
+        Self(std::array::from_fn(|word| {
+            let skipped = first.saturating_sub(word * 64);
+            self.0[word] & u64::MAX.checked_shl(skipped as u32).unwrap_or(0)
+        }))
     }
 
     /// The blocks, ascending.
@@ -128,7 +140,8 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    fn new(grid: Grid, index: usize, serial: u64) -> Self {
+    /// An empty tile.
+    pub(super) fn new(grid: Grid, index: usize, serial: u64) -> Self {
         let (column, row) = (index % grid.columns, index / grid.columns);
         let origin = [(column * TILE_SIDE) as i32, (row * TILE_SIDE) as i32];
         let side = TILE_SIDE as i32;
@@ -144,6 +157,12 @@ impl Tile {
             background: None,
             serial,
         }
+    }
+
+    /// Notes that no triangle has any pixel.
+    pub(super) fn set_empty(&mut self) {
+        self.owned = BlockSet::EMPTY;
+        self.covered = 0;
     }
 
     /// The slot of the pixel in column `x` and row `y`, or [`NO_TRIANGLE`].
@@ -191,13 +210,6 @@ impl Grid {
         self.columns * self.rows
     }
 
-    /// Empty tiles for the whole image.
-    pub(super) fn tiles(self, serial: u64) -> Vec<Tile> {
-        (0..self.len())
-            .map(|index| Tile::new(self, index, serial))
-            .collect()
-    }
-
     /// Indices of the tiles that a box of pixels touches, row by row.
     #[inline]
     pub(super) fn touched(self, b: &Bounds) -> impl Iterator<Item = usize> + use<> {
@@ -231,6 +243,14 @@ impl Bounds {
     /// The top left pixel.
     pub(super) fn anchor(&self) -> [i32; 2] {
         [i32::from(self.x0), i32::from(self.y0)]
+    }
+
+    /// Number of tiles it touches.
+    #[inline(always)]
+    pub(super) fn tiles(&self) -> usize {
+        let [x0, y0, x1, y1] =
+            [self.x0, self.y0, self.x1, self.y1].map(|v| usize::from(v >> TILE_BITS));
+        (x1 - x0 + 1) * (y1 - y0 + 1)
     }
 
     /// Whether all pixels are in the same tile.
@@ -272,7 +292,7 @@ mod tests {
     #[test]
     fn tiles_cover_the_image_and_border_tiles_hang_over() {
         let grid = Grid::new(130, 64);
-        let tiles = grid.tiles(0);
+        let tiles: Vec<_> = (0..grid.len()).map(|i| Tile::new(grid, i, 0)).collect();
         assert_eq!((grid.columns, grid.rows, tiles.len()), (3, 1, 3));
         assert_eq!(tiles.iter().map(Tile::pixels).sum::<u64>(), 130 * 64);
         assert_eq!((tiles[2].origin, tiles[2].width), ([128, 0], 2));

@@ -12,7 +12,7 @@ use super::shares::Share;
 use crate::backend::Geometry;
 use crate::geometry::screen::{GUARD_BAND_PX, SUBPIXEL_BITS, outcode};
 use crate::math::PixelPoint;
-use crate::parallel::Exec;
+use crate::parallel::{Exec, Pace, Watch, grow};
 use crate::scene::View;
 use crate::simd::{Simd, dispatch};
 use fearless_simd::prelude::*;
@@ -20,6 +20,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Vertices of a block.
 const BLOCK: usize = 16;
+/// Triangles whose blocks are marked in one go: about 10 microseconds.
+const MARKED_AT_ONCE: usize = 2048;
 /// Blocks that one task transforms: about 10 microseconds.
 const BLOCKS_PER_TASK: usize = 128;
 
@@ -39,42 +41,76 @@ pub(super) struct Vertices {
     snapped: Vec<[SnappedVertex; BLOCK]>,
     /// Homogeneous pixel space.
     points: Vec<[PixelPoint; BLOCK]>,
-    /// Blocks to be transformed; all false between passes. Several threads may set the same flag.
+    /// Blocks to be transformed. Several threads may set the same flag.
     wanted: Vec<AtomicBool>,
 }
 
 impl Vertices {
-    /// Transforms the vertices of all triangles in `shares`.
-    pub(super) fn transform(&mut self, exec: Exec, geometry: Geometry<'_>, shares: &mut [Share]) {
+    /// Makes room for a world's vertices; returns whether all of it is there, or false if it was told to stop.
+    pub(super) fn fit(&mut self, geometry: Geometry<'_>, watch: &Watch<'_>) -> bool {
         let count = geometry.world.positions.len().div_ceil(BLOCK);
-        self.snapped
-            .resize(count, [SnappedVertex::default(); BLOCK]);
-        self.points.resize(count, [[0.0; 4]; BLOCK]);
-        self.wanted.resize_with(count, AtomicBool::default);
-        let wanted = &self.wanted;
+        grow(&mut self.snapped, count, watch, |_| Default::default())
+            && grow(&mut self.points, count, watch, |_| Default::default())
+            && grow(&mut self.wanted, count, watch, |_| AtomicBool::default())
+    }
+
+    /// Wants none of the blocks. An image that was given up may have left some.
+    pub(super) fn begin(&mut self) {
+        for flag in &mut self.wanted {
+            *flag.get_mut() = false;
+        }
+    }
+
+    /// Marks the blocks of all triangles that are left in `shares`, until it is told to stop.
+    pub(super) fn mark(
+        &self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        shares: &mut [Share],
+        watch: &Watch<'_>,
+    ) {
         exec.for_each_chunk(shares, 1, |_, share| {
-            for range in share[0].ranges(geometry) {
-                for &vertex in geometry.world.triangles[range].as_flattened() {
-                    let flag = &wanted[vertex as usize / BLOCK];
+            let rest = &mut share[0].rest;
+            let mut pace = Pace::new(watch, MARKED_AT_ONCE);
+            let mut goes_on = !watch.is_over();
+            while goes_on && let Some(ids) = rest.take(geometry, pace.left()) {
+                goes_on = pace.did(ids.len());
+                for &vertex in geometry.world.triangles[ids].as_flattened() {
+                    let flag = &self.wanted[vertex as usize / BLOCK];
                     // Looking first keeps the cache line shared between threads.
                     if !flag.load(Ordering::Relaxed) {
                         flag.store(true, Ordering::Relaxed);
                     }
                 }
             }
+            pace.finish();
         });
+    }
+
+    /// Transforms the blocks that are marked and takes the marks off, until it is told to stop.
+    pub(super) fn transform(&mut self, exec: Exec, geometry: Geometry<'_>, watch: &Watch<'_>) {
+        let wanted = &self.wanted;
         let (snapped, points) = (&mut self.snapped[..], &mut self.points[..]);
         exec.for_each_chunk2(snapped, points, BLOCKS_PER_TASK, |task, snapped, points| {
+            if watch.is_over() {
+                return;
+            }
+            let first = task * BLOCKS_PER_TASK;
+            let wanted = &wanted[first..first + snapped.len()];
+            let mut is_any_wanted = false;
             dispatch!(exec.level, simd => {
-                let first = task * BLOCKS_PER_TASK;
                 for (index, (snapped, points)) in snapped.iter_mut().zip(points).enumerate() {
-                    let flag = &wanted[first + index];
+                    let flag = &wanted[index];
                     if flag.load(Ordering::Relaxed) {
+                        is_any_wanted = true;
                         flag.store(false, Ordering::Relaxed);
                         transform_block(simd, geometry, (first + index) * BLOCK, snapped, points);
                     }
                 }
             });
+            if is_any_wanted {
+                watch.may_go_on();
+            }
         });
     }
 
@@ -240,7 +276,10 @@ mod tests {
                 let mut shares = super::super::shares::Shares::default();
                 shares.cut(geometry);
                 let mut vertices = Vertices::default();
-                vertices.transform(Exec { level, threads: 1 }, geometry, shares.used_mut());
+                let (exec, watch) = (Exec { level, threads: 1 }, Watch::new(&|| true));
+                vertices.fit(geometry, &watch);
+                vertices.mark(exec, geometry, shares.used_mut(), &watch);
+                vertices.transform(exec, geometry, &watch);
                 for (v, &p) in corners.iter().enumerate() {
                     let want = view.project(p);
                     let point = vertices.point(v as u32);

@@ -5,8 +5,9 @@
 //! has the slot now is another, or owns nothing.
 
 use super::setup::Drawn;
-use super::shares::Shares;
-use crate::parallel::Exec;
+use super::shares::{Share, Shares};
+use crate::backend::Geometry;
+use crate::parallel::{Exec, Watch, grow};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The triangles that own pixels.
@@ -16,20 +17,50 @@ pub(super) struct Visible {
     slot_of: Vec<AtomicU32>,
     /// Ids, ascending.
     pub ids: Vec<u32>,
+    /// Shares whose owners are among `ids`.
+    joined: usize,
 }
 
 impl Visible {
-    /// Lists the owners, for a world of `triangles` triangles.
-    pub(super) fn list(&mut self, exec: Exec, shares: &mut Shares, triangles: usize) {
-        self.slot_of.resize_with(triangles, AtomicU32::default);
+    /// Makes room for a world's triangles; returns whether all of it is there, or false if it was told to stop.
+    pub(super) fn fit(&mut self, geometry: Geometry<'_>, watch: &Watch<'_>) -> bool {
+        let triangles = geometry.world.triangles.len();
+        grow(&mut self.slot_of, triangles, watch, |_| {
+            AtomicU32::default()
+        })
+    }
+
+    /// Begins the list.
+    pub(super) fn begin(&mut self, shares: &mut Shares) {
+        for share in shares.used_mut() {
+            share.begin_list();
+        }
+        self.ids.clear();
+        self.joined = 0;
+    }
+
+    /// Lists the owners, or goes on with it, until it is told to stop. Returns whether the list is complete.
+    pub(super) fn list(&mut self, exec: Exec, shares: &mut Shares, watch: &Watch<'_>) -> bool {
         let slot_of = &self.slot_of;
         exec.for_each_chunk(shares.used_mut(), 1, |_, share| {
-            share[0].list_visible(slot_of);
+            share[0].list_visible(slot_of, watch);
         });
-        self.ids.clear();
-        for share in shares.used() {
-            self.ids.extend_from_slice(&share.visible);
+        if !shares.used().iter().all(Share::is_listed) {
+            return false;
         }
+        if self.joined == 0 {
+            let count = shares.used().iter().map(|share| share.visible.len()).sum();
+            self.ids.reserve(count);
+        }
+        while let Some(share) = shares.used().get(self.joined) {
+            if watch.is_over() {
+                return false;
+            }
+            self.ids.extend_from_slice(&share.visible);
+            self.joined += 1;
+            watch.may_go_on();
+        }
+        true
     }
 
     /// A triangle and its slot, or `None` if it owns no pixel.
