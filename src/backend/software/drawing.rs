@@ -22,13 +22,16 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// Nothing drawn.
-    pub(super) const EMPTY: Self = Self {
-        depth: [NO_DEPTH; TILE_PIXELS],
-        slot: [NO_TRIANGLE; TILE_PIXELS],
-        farthest: [NO_DEPTH; TILE_BLOCKS],
-        owned: BlockSet::EMPTY,
-    };
+    /// Nothing drawn. (No constant, which would be copied from memory.)
+    #[inline(always)]
+    pub(super) fn empty() -> Self {
+        Self {
+            depth: [NO_DEPTH; TILE_PIXELS],
+            slot: [NO_TRIANGLE; TILE_PIXELS],
+            farthest: [NO_DEPTH; TILE_BLOCKS],
+            owned: BlockSet::EMPTY,
+        }
+    }
 }
 
 /// The piece to be drawn next.
@@ -108,7 +111,7 @@ impl Spare {
 
 fn new_block() -> Box<Unfinished> {
     Box::new(Unfinished {
-        layers: Layers::EMPTY,
+        layers: Layers::empty(),
         next: Next::default(),
     })
 }

@@ -37,6 +37,7 @@ mod shares;
 mod stages;
 mod tile;
 mod transform;
+mod triangles;
 mod visible;
 
 pub use tile::NO_TRIANGLE;

@@ -52,7 +52,7 @@ pub(super) fn draw_tile<S: Simd>(
     desk: &Desk<'_>,
 ) {
     let mut canvas = Canvas {
-        layers: Layers::EMPTY,
+        layers: Layers::empty(),
         origin: tile.origin,
         size: [tile.width, tile.height],
         places: PixelPlaces::new(simd),

@@ -9,10 +9,10 @@
 
 use super::setup::{Drawn, Piece};
 use super::tile::Bounds;
+use super::triangles::{self, Triangles};
 use crate::backend::{Geometry, RasterCounts};
 use crate::geometry::screen::DepthPlane;
 use crate::parallel::Watch;
-use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Fewest triangles of a share, but for the last: enough work to be worth a task.
@@ -25,39 +25,6 @@ const PLACE_BITS: u32 = 26;
 
 /// Set in a triangle's count of pixels if several tiles may add to it.
 const IN_SEVERAL_TILES: u32 = 1 << 31;
-
-/// Some consecutive visible triangles.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Triangles {
-    /// The range in `Geometry::visible` that holds the first triangle.
-    range: usize,
-    /// Triangles of that range that come before it.
-    skip: u64,
-    /// Number of triangles.
-    count: u64,
-}
-
-impl Triangles {
-    /// Takes away the first of them, at most `most`, and returns their ids; `None` when there are none.
-    #[inline]
-    pub(super) fn take(&mut self, geometry: Geometry<'_>, most: usize) -> Option<Range<usize>> {
-        while self.count > 0 {
-            let range = geometry.visible.get(self.range)?;
-            let available = length(range).saturating_sub(self.skip);
-            if available == 0 {
-                self.range += 1;
-                self.skip = 0;
-                continue;
-            }
-            let taken = available.min(self.count).min(most as u64);
-            let start = u64::from(range.start) + self.skip;
-            self.skip += taken;
-            self.count -= taken;
-            return Some(start as usize..(start + taken) as usize);
-        }
-        None
-    }
-}
 
 /// How far the set-up of a share is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -238,7 +205,7 @@ pub(super) struct Shares {
 impl Shares {
     /// Cuts the visible triangles into shares.
     pub(super) fn cut(&mut self, geometry: Geometry<'_>) {
-        let total: u64 = geometry.visible.iter().map(length).sum();
+        let total = triangles::total(geometry);
         let size = share_size(total);
         self.used = total.div_ceil(size) as usize;
         if self.all.len() < self.used {
@@ -248,7 +215,10 @@ impl Shares {
                 self.all.push(Share::with_room(index, room));
             }
         }
-        cut_into(&mut self.all[..self.used], geometry, size, total);
+        for (share, all) in self.all.iter_mut().zip(triangles::cut(geometry, size)) {
+            share.all = all;
+            share.rewind();
+        }
     }
 
     /// Those of the current image, in the order of their triangles.
@@ -308,30 +278,6 @@ impl Shares {
 /// How many triangles a share holds, but for the last, when there are `total`.
 fn share_size(total: u64) -> u64 {
     SMALLEST_SHARE.max(total.div_ceil(MOST_SHARES))
-}
-
-/// Number of triangles in a range.
-fn length(range: &Range<u32>) -> u64 {
-    u64::from(range.end.saturating_sub(range.start))
-}
-
-fn cut_into(shares: &mut [Share], geometry: Geometry<'_>, size: u64, total: u64) {
-    let (mut range, mut skip, mut left) = (0, 0, total);
-    for share in shares {
-        let count = size.min(left);
-        share.all = Triangles { range, skip, count };
-        share.rewind();
-        left -= count;
-        let mut taken = count;
-        while let Some(available) = geometry.visible.get(range).map(|r| length(r) - skip)
-            && available <= taken
-        {
-            taken -= available;
-            skip = 0;
-            range += 1;
-        }
-        skip += taken;
-    }
 }
 
 #[cfg(test)]

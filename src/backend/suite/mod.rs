@@ -21,6 +21,7 @@ mod fixture;
 mod presenting;
 mod repainting;
 mod robustness;
+mod turns;
 
 use super::{Backend, Capabilities};
 use crate::output::Encoding;
@@ -71,4 +72,8 @@ pub fn check(make: impl Fn() -> Box<dyn Backend>) {
     robustness::threads_make_no_difference(&fixture);
     robustness::nothing_to_draw_is_drawn(&fixture);
     robustness::odd_numbers_do_no_harm(&fixture);
+
+    turns::turns_make_no_difference(&fixture);
+    turns::what_is_given_up_leaves_no_trace(&fixture);
+    turns::siblings_draw_the_same(&fixture);
 }

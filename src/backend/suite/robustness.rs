@@ -6,7 +6,7 @@ use crate::geometry::Vec3s;
 use crate::parallel::Exec;
 
 /// Triangles of all sizes in front of, around and behind the eye.
-fn soup(random: &mut Random, width: u32, height: u32, count: usize) -> Picture {
+pub(super) fn soup(random: &mut Random, width: u32, height: u32, count: usize) -> Picture {
     let mut picture = Picture::perspective(width, height);
     for _ in 0..count {
         let size = [0.02, 0.3, 1.0, 30.0, 3000.0][random.below(5)];
