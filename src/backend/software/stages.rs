@@ -9,7 +9,7 @@ use super::drawing::{Desk, Drawing};
 use super::raster;
 use super::resolve::{self, Painter};
 use super::setup;
-use super::shares::Progress;
+use super::shares::{Progress, Share};
 use super::tile::{Grid, TILE_BLOCKS, Tile};
 use crate::backend::{BasePaint, Geometry, RasterCounts};
 use crate::parallel::{Exec, Turn, Watch, grow};
@@ -189,7 +189,7 @@ impl SoftwareBackend {
                     return;
                 }
             } else {
-                dispatch!(exec.level, simd => raster::draw_tile(simd, tile, index, shares, drawing, desk));
+                draw_tile(exec, tile, index, shares, drawing, desk);
             }
             watch.may_go_on();
         });
@@ -249,6 +249,19 @@ impl SoftwareBackend {
         }
         counts
     }
+}
+
+/// Draws a tile. (Not inlined: with its memory on the stack, passing over a tile would take as long as ten lines of memory.)
+#[inline(never)]
+fn draw_tile(
+    exec: Exec,
+    tile: &mut Tile,
+    index: usize,
+    shares: &[Share],
+    drawing: &mut Drawing,
+    desk: &Desk<'_>,
+) {
+    dispatch!(exec.level, simd => raster::draw_tile(simd, tile, index, shares, drawing, desk));
 }
 
 /// Single stages, for benchmarks only. None may be left out.
