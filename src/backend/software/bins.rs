@@ -44,11 +44,14 @@ pub(super) fn fill(share: &mut Share, grid: Grid, watch: &Watch<'_>) {
 /// Counts the entries of pieces from number `first` on. Returns where to go on when it is told to stop.
 fn count_entries(share: &mut Share, grid: Grid, first: usize, watch: &Watch<'_>) -> Option<usize> {
     let mut pace = Pace::new(watch, ENTRIES_AT_ONCE);
+    let starts = &mut share.bin_starts[..];
     for (index, piece) in share.pieces.iter().enumerate().skip(first) {
+        let mut entries = 0;
         for tile in grid.touched(&piece.bounds) {
-            share.bin_starts[tile + 2] += 1;
+            starts[tile + 2] += 1;
+            entries += 1;
         }
-        if !pace.did(piece.bounds.tiles()) {
+        if !pace.did(entries) {
             return Some(index + 1);
         }
     }
@@ -68,13 +71,16 @@ fn sum_up(share: &mut Share) {
 /// Fills in the entries of pieces from number `first` on. Returns where to go on when it is told to stop.
 fn fill_in(share: &mut Share, grid: Grid, first: usize, watch: &Watch<'_>) -> Option<usize> {
     let mut pace = Pace::new(watch, ENTRIES_AT_ONCE);
+    let starts = &mut share.bin_starts[..];
     for (index, piece) in share.pieces.iter().enumerate().skip(first) {
+        let mut entries = 0;
         for tile in grid.touched(&piece.bounds) {
-            let next = &mut share.bin_starts[tile + 1];
+            let next = &mut starts[tile + 1];
             share.bin_entries[*next as usize] = index as u32;
             *next += 1;
+            entries += 1;
         }
-        if !pace.did(piece.bounds.tiles()) {
+        if !pace.did(entries) {
             return Some(index + 1);
         }
     }

@@ -245,14 +245,6 @@ impl Bounds {
         [i32::from(self.x0), i32::from(self.y0)]
     }
 
-    /// Number of tiles it touches.
-    #[inline(always)]
-    pub(super) fn tiles(&self) -> usize {
-        let [x0, y0, x1, y1] =
-            [self.x0, self.y0, self.x1, self.y1].map(|v| usize::from(v >> TILE_BITS));
-        (x1 - x0 + 1) * (y1 - y0 + 1)
-    }
-
     /// Whether all pixels are in the same tile.
     #[inline(always)]
     pub(super) fn is_in_one_tile(&self) -> bool {
