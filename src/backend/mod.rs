@@ -28,7 +28,7 @@ pub use kind::BackendKind;
 use crate::geometry::{Bary, Vec3s};
 use crate::illumination::ActiveLights;
 pub use crate::output::Interpolation;
-use crate::output::Target;
+use crate::output::{Rect, Target};
 use crate::parallel::{Exec, Turn};
 use crate::scene::{View, World};
 use std::fmt::Debug;
@@ -265,6 +265,13 @@ pub trait Backend: Debug + Send {
     /// Brings `target` up to the current image and marks it with its stamp; pixels known to be right already are not
     /// touched. Returns the number of pixels written, as told by [`pending_pixels`](Self::pending_pixels) just before.
     fn present(&mut self, exec: Exec, target: &mut Target<'_>) -> u64;
+
+    /// Appends the pixels that [`present`](Self::present) would write now to `out`, as rectangles that do not overlap.
+    fn changes(&self, target: &Target<'_>, out: &mut Vec<Rect>) {
+        if self.pending_pixels(target) > 0 {
+            out.extend(target.rect());
+        }
+    }
 
     /// A new backend of the same kind, without an image: what it draws is the same, bit for bit. `None` if there can be only one.
     fn sibling(&self) -> Option<Box<dyn Backend>> {

@@ -28,7 +28,7 @@ pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
     let (budget_ms, budget_work) = match stats.budget {
         Budget::Millis(ms) => (Some(ms), None),
         Budget::Work(units) => (None, Some(units)),
-        Budget::Unlimited => (None, None),
+        Budget::Error(_) | Budget::Unlimited | Budget::Replay(_) => (None, None),
     };
     let stages: Map<String, Value> = (stats.stage_ms.entries())
         .into_iter()
@@ -128,7 +128,8 @@ impl FrameReport {
                 format!(", budget {ms:.2} ms: {verdict}")
             }
             Budget::Work(units) => format!(", {} of {units} work units", stats.work_units),
-            Budget::Unlimited => String::new(),
+            Budget::Error(rmse) => format!(", until about {rmse} codes of error"),
+            Budget::Unlimited | Budget::Replay(_) => String::new(),
         };
         let converged = if stats.converged { ", converged" } else { "" };
         format!(

@@ -6,7 +6,7 @@ use crate::backend::{Backend, BasePaint, Geometry, RasterCounts};
 use crate::geometry::Vec3s;
 use crate::highlight::{self, SignBits};
 use crate::illumination::{PointBatch, VertexSet};
-use crate::parallel::Exec;
+use crate::parallel::{Exec, Turn};
 use crate::scene::{View, World};
 use crate::visibility::{CullCounts, Culler};
 use std::ops::Range;
@@ -14,7 +14,6 @@ use std::ops::Range;
 /// The first image of a view, and what was learned while drawing it.
 #[derive(Debug)]
 pub(super) struct BaseImage {
-    culler: Culler,
     visible: Vec<Range<u32>>,
     /// Linear colours: of vertices, or of triangles if shading is flat. Those of visible triangles are valid.
     colours: Vec3s,
@@ -40,7 +39,6 @@ pub(super) struct BaseImage {
 impl BaseImage {
     pub(super) fn new(world: &World) -> Self {
         Self {
-            culler: Culler::new(&world.clusters),
             visible: Vec::new(),
             colours: Vec3s::default(),
             signs: SignBits::default(),
@@ -56,11 +54,6 @@ impl BaseImage {
             pht_visible: 0,
             matte_visible: 0,
         }
-    }
-
-    /// Takes over where the clusters are after some of them have moved.
-    pub(super) fn refit(&mut self, world: &World) {
-        self.culler.refit(&world.clusters);
     }
 
     /// What there is to draw of the view last culled.
@@ -83,8 +76,8 @@ impl BaseImage {
         !self.signs.pht_lights(corners).is_empty()
     }
 
-    pub(super) fn cull(&mut self, view: &View) {
-        self.culled = self.culler.cull(view, &mut self.visible);
+    pub(super) fn cull(&mut self, culler: &mut Culler, view: &View) {
+        self.culled = culler.cull(view, &mut self.visible);
     }
 
     pub(super) fn rasterize(
@@ -93,12 +86,32 @@ impl BaseImage {
         world: &World,
         view: &View,
         backend: &mut dyn Backend,
-    ) {
-        self.raster = backend.rasterize(exec, self.geometry(world, view));
+        turn: Turn<'_>,
+    ) -> bool {
+        let Some(counts) = backend.rasterize_while(exec, self.geometry(world, view), turn) else {
+            return false;
+        };
+        self.raster = counts;
         self.visible_triangles = backend.visible_triangles().len() as u64;
+        true
     }
 
-    /// Illuminates what the method needs for its first image.
+    /// Triangles in clusters that were not culled.
+    pub(super) fn triangles_handed_over(&self) -> u64 {
+        u64::from(self.culled.triangles)
+    }
+
+    /// Triangles that own a pixel.
+    pub(super) fn visible_triangles(&self) -> u64 {
+        self.visible_triangles
+    }
+
+    /// Pixels that some triangle owns.
+    pub(super) fn covered_pixels(&self) -> u64 {
+        self.raster.covered_pixels
+    }
+
+    /// One turn of illuminating what the method needs for its first image. False if it was told to stop.
     pub(super) fn shade(
         &mut self,
         exec: Exec,
@@ -106,18 +119,21 @@ impl BaseImage {
         world: &World,
         view: &View,
         backend: &dyn Backend,
-    ) {
+        turn: Turn<'_>,
+    ) -> bool {
         match method {
-            Method::Phong => {}
-            Method::Flat => self.shade_triangles(exec, world, view, backend),
-            _ => self.shade_vertices(exec, world, view, backend),
+            method if method.shades_first_image_per_pixel() => true,
+            Method::Flat => {
+                self.shade_triangles(exec, world, view, backend);
+                true
+            }
+            _ => {
+                let triangles = backend.visible_triangles();
+                let colours = &mut self.colours;
+                self.corners
+                    .illuminate_while(exec, world, view.eye, triangles, colours, turn)
+            }
         }
-    }
-
-    fn shade_vertices(&mut self, exec: Exec, world: &World, view: &View, backend: &dyn Backend) {
-        let triangles = backend.visible_triangles();
-        self.corners
-            .illuminate(exec, world, view.eye, triangles, &mut self.colours);
     }
 
     /// One colour per triangle, at its centroid with its geometric normal.
@@ -167,6 +183,7 @@ impl BaseImage {
         }
     }
 
+    /// One turn of giving the image its colours. False if it was told to stop.
     pub(super) fn resolve(
         &mut self,
         exec: Exec,
@@ -174,13 +191,14 @@ impl BaseImage {
         world: &World,
         view: &View,
         backend: &mut dyn Backend,
-    ) {
+        turn: Turn<'_>,
+    ) -> bool {
         let paint = match method {
-            Method::Phong => BasePaint::Phong,
+            method if method.shades_first_image_per_pixel() => BasePaint::Phong,
             Method::Flat => BasePaint::Flat(&self.colours),
             _ => BasePaint::Gouraud(&self.colours),
         };
-        backend.resolve(exec, self.geometry(world, view), paint);
+        backend.resolve_while(exec, self.geometry(world, view), paint, turn)
     }
 
     /// The paper's sign tests at the vertices of everything that was handed to the rasterizer, and a count of the

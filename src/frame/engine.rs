@@ -1,16 +1,18 @@
 //! The engine as its users see it: made for a scene, asked for frames. The frame loop is in [`renderer`](super::renderer).
 
-use super::options::{EngineError, EngineOptions, own_pool, suits};
+use super::calibration::calibrate;
+use super::options::{EngineError, EngineOptions, Overrun, own_pool, suits};
+use super::picture::Picture;
 use super::refinement::{Leaf, for_each_leaf};
-use super::renderer::Renderer;
+use super::renderer::{Renderer, Work};
 use super::stats::FrameStats;
 use crate::backend::Backend;
 use crate::clock::Clock;
 use crate::geometry::screen::MAX_IMAGE_SIDE;
-use crate::output::{Encoding, Frame, Target};
+use crate::output::{Encoding, Frame, Rect, Target};
 use crate::parallel::Exec;
 use crate::scene::{Scene, World};
-use crate::schedule::{Allowance, Budget};
+use crate::schedule::{Allowance, Budget, CancelToken, CostModel};
 use crate::simd::SimdLevel;
 use std::sync::Arc;
 
@@ -33,6 +35,8 @@ pub struct Engine {
     clock: Arc<dyn Clock>,
     exec: Exec,
     pool: Option<Arc<rayon::ThreadPool>>,
+    overrun: Overrun,
+    cancel: CancelToken,
     renderer: Renderer,
 }
 
@@ -81,11 +85,19 @@ impl Engine {
             None => own_pool(options.threads)?,
         };
         let threads = pool.as_ref().map_or(1, |pool| pool.current_num_threads());
+        let exec = Exec { level, threads };
+        let costs = match (options.costs, backend.sibling()) {
+            (Some(costs), _) if costs.is_valid() => costs,
+            (None, Some(sibling)) => calibrate(exec, pool.as_deref(), &*options.clock, sibling),
+            _ => CostModel::default(),
+        };
         Ok(Self {
             clock: options.clock,
-            exec: Exec { level, threads },
+            exec,
             pool,
-            renderer: Renderer::new(scene, backend, options.method, options.encoding),
+            overrun: options.overrun,
+            cancel: options.cancel,
+            renderer: Renderer::new(scene, backend, options.method, options.encoding, costs),
         })
     }
 
@@ -112,8 +124,7 @@ impl Engine {
         budget: Budget,
         mut target: Target<'_>,
     ) -> FrameStats {
-        let age = (target.age() as usize).checked_sub(1);
-        let stamp = age.and_then(|age| *self.renderer.handed_over.get(age)?);
+        let stamp = self.renderer.handover.stamp(target.age());
         target.mark(stamp);
         self.render_target(scene, budget, &mut target)
     }
@@ -124,7 +135,11 @@ impl Engine {
         budget: Budget,
         target: &mut Target<'_>,
     ) -> FrameStats {
-        let allowance = Allowance::new(budget, &*self.clock, self.clock.now_ms());
+        let start_ms = self.clock.now_ms();
+        let mut allowance = Allowance::new(budget, &*self.clock, start_ms, &self.cancel);
+        if self.overrun == Overrun::BeLate {
+            allowance = allowance.with_whole_first_images();
+        }
         let (renderer, exec) = (&mut self.renderer, self.exec);
         // Waking threads takes longer than some frames.
         match self
@@ -132,8 +147,14 @@ impl Engine {
             .as_ref()
             .filter(|_| renderer.needs_threads(scene, target))
         {
-            Some(pool) => pool.install(|| renderer.render(exec, scene, budget, allowance, target)),
-            None => renderer.render(exec.on_one_thread(), scene, budget, allowance, target),
+            Some(pool) => {
+                let work = Work::new(exec, allowance);
+                pool.install(|| renderer.render(scene, budget, work, target))
+            }
+            None => {
+                let work = Work::new(exec.on_one_thread(), allowance);
+                renderer.render(scene, budget, work, target)
+            }
         }
     }
 
@@ -149,20 +170,77 @@ impl Engine {
         self.forget();
         // Nobody has seen these frames.
         self.renderer.frames = frames;
-        self.renderer.handed_over.clear();
+        self.renderer.handover.forget();
     }
 
     /// Forgets the current image, so that the next frame starts cold. Memory stays allocated and threads stay awake.
     pub fn forget(&mut self) {
-        self.renderer.seen = None;
+        self.renderer.shelf.forget();
+    }
+
+    /// Goes on with the last frame's image in spare time, until `deadline_ms` of the engine's [clock](EngineOptions::clock), the
+    /// image is final, or the [token](Self::cancel_token) is cancelled. Returns whether the image is final.
+    ///
+    /// The next frame of the same view starts from what has been done.
+    pub fn refine_until(&mut self, deadline_ms: f64) -> bool {
+        let start_ms = self.clock.now_ms();
+        let budget = Budget::from_millis(deadline_ms - start_ms);
+        // No time at all is not what buys a first image.
+        if budget == Budget::Millis(0.0) {
+            return self.renderer.is_final();
+        }
+        let allowance = Allowance::new(budget, &*self.clock, start_ms, &self.cancel);
+        let mut work = Work::new(self.exec, allowance);
+        let renderer = &mut self.renderer;
+        match self.pool.as_ref().filter(|_| !renderer.is_final()) {
+            Some(pool) => pool.install(|| renderer.spend_spare_time(&mut work)),
+            None => renderer.spend_spare_time(&mut work),
+        }
+    }
+
+    /// A token that stops the engine from another thread.
+    #[must_use]
+    pub fn cancel_token(&self) -> CancelToken {
+        self.cancel.clone()
+    }
+
+    /// The engine's clock, in milliseconds since its origin: what [`refine_until`](Self::refine_until) takes.
+    #[must_use]
+    pub fn now_ms(&self) -> f64 {
+        self.clock.now_ms()
+    }
+
+    /// The pixels of the target that the last frame changed, as rectangles that do not overlap: what window systems call damage.
+    /// Nothing if the target held the image already.
+    #[must_use]
+    pub fn changed(&self) -> &[Rect] {
+        self.renderer.handover.changed()
+    }
+
+    /// What the engine has learned about the time that work takes. An engine of the same kind that
+    /// [starts from it](EngineOptions::costs) need not find out again.
+    #[must_use]
+    pub fn costs(&self) -> &CostModel {
+        &self.renderer.costs
     }
 
     /// Calls `f` with everything that the current image consists of: visible triangles, or the leaves and parts that
     /// they were divided into. Nothing before the first frame, and after [`forget`](Self::forget).
     pub fn for_each_leaf(&self, f: impl FnMut(&Leaf)) {
-        let r = &self.renderer;
-        if r.seen.is_some() && r.is_lit {
-            for_each_leaf(r.method, &r.world, &r.base, &*r.backend, &r.refinement, f);
+        let Renderer {
+            method,
+            world,
+            shelf,
+            ..
+        } = &self.renderer;
+        if let Some(picture) = shelf.shown().filter(|picture| picture.view().is_some()) {
+            let Picture {
+                base,
+                backend,
+                refinement,
+                ..
+            } = picture;
+            for_each_leaf(*method, world, base, &**backend, refinement, f);
         }
     }
 

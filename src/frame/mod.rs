@@ -5,16 +5,21 @@
 //! the first image, `refinement/` makes it better; `refine_first.rs` is how, where the backend cannot repaint.
 
 mod base;
+mod calibration;
 mod engine;
+mod handover;
+mod load;
 mod method;
 mod options;
+mod picture;
 mod refine_first;
 mod refinement;
 mod renderer;
+mod shelf;
 mod stats;
 
 pub use engine::Engine;
 pub use method::Method;
-pub use options::{EngineError, EngineOptions};
+pub use options::{EngineError, EngineOptions, Overrun};
 pub use refinement::{Leaf, LeafKind};
 pub use stats::{FrameStats, Outcome, Skipped, StageTimes};

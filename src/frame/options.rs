@@ -4,6 +4,7 @@ use super::Method;
 use crate::backend::{Backend, BackendKind};
 use crate::clock::{Clock, SystemClock};
 use crate::output::Encoding;
+use crate::schedule::{CancelToken, CostModel};
 use crate::simd::SimdLevel;
 use std::sync::Arc;
 
@@ -26,6 +27,24 @@ pub struct EngineOptions {
     pub simd: Option<SimdLevel>,
     /// Where time comes from.
     pub clock: Arc<dyn Clock>,
+    /// What happens when a first image does not fit into a wall-clock budget.
+    pub overrun: Overrun,
+    /// Stops the engine from another thread.
+    pub cancel: CancelToken,
+    /// What is known about the time that work takes, from [`Engine::costs`](super::Engine::costs) of an earlier engine. With `None` it is
+    /// found out when the engine is made, in at most 20 milliseconds; with one that makes no sense it is guessed. Either way the engine
+    /// goes on learning.
+    pub costs: Option<CostModel>,
+}
+
+/// What happens when a first image does not fit into a wall-clock budget.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Overrun {
+    /// The deadline holds, see [`Budget`](crate::schedule::Budget): lower resolution, or an image over several frames.
+    #[default]
+    HoldDeadline,
+    /// The frame is late: each has a first image of its own, at full resolution. For measurements of methods against each other.
+    BeLate,
 }
 
 impl Default for EngineOptions {
@@ -38,6 +57,9 @@ impl Default for EngineOptions {
             pool: None,
             simd: None,
             clock: Arc::new(SystemClock::new()),
+            overrun: Overrun::default(),
+            cancel: CancelToken::new(),
+            costs: None,
         }
     }
 }
@@ -93,7 +115,7 @@ pub(super) fn suits(method: Method, backend: &dyn Backend) -> bool {
     let capabilities = backend.capabilities();
     match method {
         Method::Flat | Method::Gouraud | Method::Adaptive => true,
-        Method::Phong => capabilities.per_pixel,
+        Method::Phong | Method::PhongHalf => capabilities.per_pixel,
         Method::PhongArea => capabilities.refines_in_place(),
     }
 }

@@ -1,52 +1,73 @@
 //! The frame loop.
 
 use super::Method;
-use super::base::BaseImage;
-use super::refine_first::RefineFirst;
-use super::refinement::Refinement;
+use super::handover::Handover;
+use super::load::{self, ImageLoad, MARGIN_MS};
+use super::picture::{Easel, Pass, Picture, Studio};
+use super::shelf::{Shelf, Size};
 use super::stats::{FrameStats, Outcome, StageTimes};
 use crate::backend::Backend;
 use crate::geometry::screen::MAX_IMAGE_SIDE;
-use crate::output::{Encoding, Stamp, Target};
+use crate::output::{Encoding, Target};
 use crate::parallel::Exec;
 use crate::scene::{GeometryChange, Placement, Scene, View, World};
-use crate::schedule::{Allowance, Budget, LearnedRate, cost};
-use std::collections::VecDeque;
-
-/// Buffers older than this many frames are written anew: nobody queues more.
-const MOST_AGE: usize = 16;
+use crate::schedule::{Allowance, Budget, CostModel, Kind, Ladder, cost};
+use crate::visibility::Culler;
 
 /// An image that takes one thread less time than this, by nominal costs, is not shared among threads: waking them takes 10
 /// microseconds while they are busy, and 80 after they have slept.
 const LEAST_NS_TO_SHARE: f32 = 100_000.0;
 
-/// Refinement ends so much before it has to: what comes after it does not always take the same time.
-const MARGIN_MS: f64 = 0.03;
-
-/// A frame of fewer pixels handed over does not tell how long one takes.
-const LEAST_PIXELS_TO_LEARN_FROM: u64 = 1 << 15;
+/// Share of a budget that is kept at most, while a first image is drawn, for handing over the image before.
+const MOST_RESERVED: f64 = 0.5;
 
 /// Everything of an engine that a frame changes.
 #[derive(Debug)]
 pub(super) struct Renderer {
     pub(super) method: Method,
     pub(super) encoding: Encoding,
-    pub(super) placement: Placement,
+    placement: Placement,
     pub(super) world: World,
-    pub(super) backend: Box<dyn Backend>,
-    /// The view for which the backend knows who owns which pixel, if it does for any.
-    pub(super) seen: Option<View>,
-    /// Whether the image of that view has its colours, as far as it has been refined.
-    pub(super) is_lit: bool,
-    pub(super) base: BaseImage,
-    pub(super) refinement: Refinement,
-    /// For a backend that cannot repaint.
-    pub(super) refine_first: RefineFirst,
-    /// Time per pixel handed over to the caller.
-    pub(super) presenting: LearnedRate,
+    culler: Culler,
+    /// The images: the one shown, and perhaps another one in the making.
+    pub(super) shelf: Shelf,
+    /// The view asked for in the last frame; `None` when the scene has changed since.
+    last_view: Option<View>,
+    ladder: Ladder,
+    pub(super) costs: CostModel,
+    /// What the first image drawn last consisted of.
+    load: ImageLoad,
+    pub(super) handover: Handover,
     pub(super) frames: u64,
-    /// Which images the last frames handed over, the latest first.
-    pub(super) handed_over: VecDeque<Option<Stamp>>,
+}
+
+/// A frame, or spare time between frames, in hand.
+pub(super) struct Work<'a> {
+    pub(super) exec: Exec,
+    pub(super) allowance: Allowance<'a>,
+    stages: StageTimes,
+    predicted: StageTimes,
+    /// Whether the owners of all pixels were known from the frame before.
+    knew_owners: bool,
+}
+
+impl<'a> Work<'a> {
+    pub(super) fn new(exec: Exec, allowance: Allowance<'a>) -> Self {
+        Self {
+            exec,
+            allowance,
+            stages: StageTimes::default(),
+            predicted: StageTimes::default(),
+            knew_owners: false,
+        }
+    }
+}
+
+/// An image to be drawn.
+struct Commission {
+    size: Size,
+    view: View,
+    divisor: u32,
 }
 
 impl Renderer {
@@ -56,99 +77,229 @@ impl Renderer {
         backend: Box<dyn Backend>,
         method: Method,
         encoding: Encoding,
+        costs: CostModel,
     ) -> Self {
         let (placement, world) = Placement::new(scene);
         Self {
             method,
             encoding,
             placement,
-            base: BaseImage::new(&world),
+            culler: Culler::new(&world.clusters),
+            shelf: Shelf::new(backend, &world),
+            last_view: None,
+            ladder: Ladder::default(),
+            costs,
+            load: ImageLoad::guess(&world),
+            handover: Handover::new(),
             world,
-            backend,
-            seen: None,
-            is_lit: false,
-            refinement: Refinement::default(),
-            refine_first: RefineFirst::default(),
-            presenting: LearnedRate::new(cost::PRESENT_PIXEL_NS, LEAST_PIXELS_TO_LEARN_FROM),
             frames: 0,
-            handed_over: VecDeque::with_capacity(MOST_AGE),
         }
     }
 
     /// One frame: draw the first image if there is none, refine it while the budget lasts, hand it over.
     pub(super) fn render(
         &mut self,
-        exec: Exec,
         scene: &Scene,
         budget: Budget,
-        mut allowance: Allowance<'_>,
+        mut work: Work<'_>,
         target: &mut Target<'_>,
     ) -> FrameStats {
-        let mut stages = StageTimes::default();
-        self.adopt(exec, scene);
-        stages.cull += allowance.elapsed_ms();
-        let view = self.view(scene, target);
-
-        let is_seen = self.seen == Some(view);
-        if !is_seen {
-            self.look(exec, &view, &allowance, &mut stages);
-        }
-        let is_new = !self.is_lit;
-        if is_new {
-            self.light(exec, &view, &allowance, &mut stages);
-        }
-
-        let refining_since = allowance.elapsed_ms();
+        let asked = self.view(scene, target);
+        let is_still = self.placement.is_up_to_date(scene) && self.last_view == Some(asked);
+        self.draw(scene, target, is_still, &mut work);
+        let is_current = self.is_current(scene, target);
         let mut drawing_ms = None;
-        if self.method.is_progressive() {
-            drawing_ms = self.refine(exec, &view, &mut allowance, target);
+        if is_current {
+            drawing_ms = self.refine(Some(target), &mut work);
         }
-        let presenting_since = allowance.elapsed_ms();
-        let drawing = drawing_ms.unwrap_or(0.0);
-        stages.refine += presenting_since - refining_since - drawing;
-        stages.resolve += drawing;
+        let pixels_written = self.hand_over(&mut work, target);
 
-        let pixels_written = self.backend.present(exec, target);
-        self.handed_over.truncate(MOST_AGE - 1);
-        self.handed_over.push_front(target.stamp());
-        let frame_ms = allowance.elapsed_ms();
-        stages.present += frame_ms - presenting_since;
-        self.presenting
-            .learn(pixels_written, frame_ms - presenting_since);
-
-        let converged = self.has_converged();
-        let mut stats = FrameStats {
-            frame: self.frames + 1,
-            frame_ms,
-            outcome: match (is_new, allowance.spent_units(), converged) {
-                (false, 0, _) if drawing_ms.is_none() => Outcome::Unchanged,
-                (_, _, true) => Outcome::Complete,
-                (true, 0, false) => Outcome::BaseOnly,
-                (_, _, false) => Outcome::Refined,
-            },
-            converged,
-            triangles: self.world.triangles.len() as u64,
-            work_units: allowance.spent_units(),
-            pixels_written,
-            stage_ms: stages,
-            ..FrameStats::empty(budget)
-        };
-        self.base.report(&mut stats);
-        self.refinement.report(self.method, &mut stats);
-        if is_seen {
+        self.frames += 1;
+        let is_up_to_date = self.placement.is_up_to_date(scene);
+        self.last_view = is_up_to_date.then(|| self.view(scene, target));
+        let mut stats = self.report(budget, &work);
+        stats.outcome = self.outcome(is_current, &work, drawing_ms.is_some());
+        stats.pixels_written = pixels_written;
+        let pixels = u64::from(asked.width) * u64::from(asked.height);
+        stats.skipped.pixels_unchanged = pixels.saturating_sub(pixels_written);
+        if work.knew_owners {
             stats.skipped.visibility_pixels = stats.covered_pixels;
         }
-        let pixels = u64::from(target.width()) * u64::from(target.height());
-        stats.skipped.pixels_unchanged = pixels.saturating_sub(pixels_written);
-        self.frames += 1;
         stats
     }
 
-    /// Whether the image of the view last seen is final, once it is lit.
-    fn has_converged(&self) -> bool {
-        !self.method.is_progressive()
-            || (self.refinement.is_finished()
-                && (!self.refines_first() || self.refine_first.is_up_to_date(&self.refinement)))
+    /// Draws first images until the one asked for is complete, or time is up.
+    fn draw(&mut self, scene: &Scene, target: &Target<'_>, is_still: bool, work: &mut Work<'_>) {
+        let divisor = self.choose_divisor(scene, target, work);
+        work.allowance.note_divisor(divisor);
+        let mut is_first = true;
+        while let Some(image) = self.next_image(scene, target, divisor, is_still, work) {
+            if !(work.allowance.begins_image()
+                && self.draw_image(&image, Some(target), is_first, work))
+            {
+                return;
+            }
+            is_first = false;
+        }
+    }
+
+    /// The divisor for the next image: the full resolution unless time is short.
+    fn choose_divisor(&mut self, scene: &Scene, target: &Target<'_>, work: &Work<'_>) -> u32 {
+        if let Some(divisor) = self.method.divisor().or(work.allowance.replayed_divisor()) {
+            return divisor;
+        }
+        let Some(budget_ms) = work.allowance.first_image_ms() else {
+            return 1;
+        };
+        let view = self.view(scene, target);
+        if self.placement.is_up_to_date(scene)
+            && let Some(size) = [Size::Full, Size::Reduced].into_iter().find(|&size| {
+                let picture = self.shelf.get(size);
+                picture.is_some_and(|picture| picture.shows(&view.reduced(picture.divisor)))
+            })
+        {
+            return self.shelf.get(size).map_or(1, |picture| picture.divisor);
+        }
+        if !self.shelf.can_reduce() {
+            return 1;
+        }
+        let lights = scene.lights().len();
+        self.ladder.choose(budget_ms, |divisor| {
+            self.load
+                .forecast(&self.costs, self.method, lights, &view, divisor)
+        })
+    }
+
+    /// What is to be drawn next, if the image asked for is not there yet.
+    fn next_image(
+        &mut self,
+        scene: &Scene,
+        target: &Target<'_>,
+        divisor: u32,
+        is_still: bool,
+        work: &mut Work<'_>,
+    ) -> Option<Commission> {
+        // What is in hand is finished as it was begun, unless something else would be there sooner.
+        if let Some((size, view, own_divisor)) = self.shelf.view_in_hand() {
+            let is_asked_for = self.placement.is_up_to_date(scene)
+                && view == self.view(scene, target).reduced(own_divisor);
+            if is_asked_for || own_divisor == divisor {
+                let divisor = own_divisor;
+                return Some(Commission {
+                    size,
+                    view,
+                    divisor,
+                });
+            }
+            self.shelf.abandon(size);
+        }
+        self.adopt(scene, work);
+        let full = self.view(scene, target);
+        work.knew_owners |=
+            work.allowance.record().images == 0 && self.shelf.full().knows_owners(&full);
+        if self.shelf.shows(Size::Full, &full) {
+            return None;
+        }
+        let small = full.reduced(divisor);
+        if divisor > 1 && !self.shelf.shows(Size::Reduced, &small) {
+            let (size, view) = (Size::Reduced, small);
+            return Some(Commission {
+                size,
+                view,
+                divisor,
+            });
+        }
+        // While the view stays, the full resolution follows.
+        (divisor == 1 || is_still && self.method.divisor().is_none()).then_some(Commission {
+            size: Size::Full,
+            view: full,
+            divisor: 1,
+        })
+    }
+
+    /// Draws a first image, or goes on with it. False when time is up before it can be shown. `is_first` says that nothing has
+    /// been done in this frame yet.
+    fn draw_image(
+        &mut self,
+        image: &Commission,
+        target: Option<&Target<'_>>,
+        is_first: bool,
+        work: &mut Work<'_>,
+    ) -> bool {
+        let Commission {
+            size,
+            view,
+            divisor,
+        } = *image;
+        // What was left over for a frame of its own is not left over again.
+        let is_due = |pass| is_first && self.shelf.pass(size) == pass;
+        let (is_colouring_due, is_showing_due) = (is_due(Pass::Colouring), is_due(Pass::Coloured));
+        self.shelf
+            .begin(size, view, divisor, self.frames + 1, &self.world);
+        self.reserve_handing_over(target, work);
+
+        let (handing_over_ms, resolve_ms) = self.ending_ms(&view, divisor, target);
+        let is_shown = self.shelf.shown_size() == Some(size);
+        let Work {
+            exec,
+            allowance,
+            stages,
+            predicted,
+            ..
+        } = work;
+        let picture = self.shelf.get_or_make(size, &self.world);
+        let mut studio = Studio {
+            exec: *exec,
+            method: self.method,
+            world: &self.world,
+            culler: &mut self.culler,
+            costs: &mut self.costs,
+            load: &mut self.load,
+            stages,
+            predicted,
+        };
+        if !picture.prepare(&mut studio, allowance) || !allowance.completes_image() {
+            return false;
+        }
+        if is_shown {
+            let has_time = allowance.has_time_for(resolve_ms + handing_over_ms);
+            if !(is_colouring_due || has_time) || !picture.colour(&mut studio, allowance, true) {
+                return false;
+            }
+        } else {
+            let is_coloured = picture.colour(&mut studio, allowance, false);
+            let has_time = allowance.has_time_for(handing_over_ms);
+            if !is_coloured || !(is_showing_due || has_time) {
+                return false;
+            }
+        }
+        self.shelf.publish(size, &self.world);
+        allowance.note_image();
+        true
+    }
+
+    /// Milliseconds that handing the whole of an image over, and colouring it, will probably not exceed.
+    fn ending_ms(&self, view: &View, divisor: u32, target: Option<&Target<'_>>) -> (f64, f64) {
+        let load = self
+            .load
+            .resolve(self.method, self.world.lights.len(), view);
+        let resolve_ms = self.costs.predict_at_most_ms(Kind::Resolve, load);
+        let handing_over_ms = target.map_or(0.0, |target| {
+            let size = [target.width(), target.height()];
+            load::handing_over_ms(&self.costs, size, divisor) + MARGIN_MS
+        });
+        (handing_over_ms, resolve_ms)
+    }
+
+    /// Keeps what handing over the image shown will take.
+    fn reserve_handing_over(&mut self, target: Option<&Target<'_>>, work: &mut Work<'_>) {
+        let ms = target.map_or(0.0, |target| {
+            self.handover
+                .predict_ms(&self.costs, self.shelf.shown(), target)
+        }) + MARGIN_MS;
+        // Where handing over takes all of the time, an image still has to come about.
+        let most_ms = work.allowance.first_image_ms().unwrap_or(f64::INFINITY) * MOST_RESERVED;
+        work.allowance.reserve_ms(ms.min(most_ms));
     }
 
     /// Whether a frame has enough to do to share it among threads. Not so where nothing has changed and nothing is left to be
@@ -158,18 +309,23 @@ impl Renderer {
         let pixels = target.width() as f32 * target.height() as f32;
         let triangles = scene.triangle_count() as f32;
         let nominal_ns = cost::first_image(triangles, pixels)
-            + match self.method {
-                Method::Phong => cost::phong(pixels, lights),
-                _ => cost::vertices(triangles, lights),
+            + if self.method.shades_first_image_per_pixel() {
+                cost::phong(pixels, lights)
+            } else {
+                cost::vertices(triangles, lights)
             };
         if !self.method.is_progressive() && nominal_ns < LEAST_NS_TO_SHARE {
             return false;
         }
+        let view = self.view(scene, target);
         let is_settled = self.placement.is_up_to_date(scene)
-            && self.is_lit
-            && self.seen == Some(self.view(scene, target))
-            && self.has_converged()
-            && self.backend.pending_pixels(target) == 0;
+            && self.shelf.in_hand().is_none()
+            && self.shelf.shown().is_some_and(|picture| {
+                picture.divisor == self.method.divisor().unwrap_or(1)
+                    && picture.shows(&view.reduced(picture.divisor))
+                    && picture.has_converged(self.method)
+            })
+            && self.handover.pending_pixels(self.shelf.shown(), target) == 0;
         !is_settled
     }
 
@@ -183,133 +339,177 @@ impl Renderer {
     }
 
     /// Takes over what has changed of the scene.
-    fn adopt(&mut self, exec: Exec, scene: &Scene) {
-        let changes = self.placement.update(exec, &mut self.world, scene);
+    fn adopt(&mut self, scene: &Scene, work: &mut Work<'_>) {
+        let since = work.allowance.elapsed_ms();
+        let changes = self.placement.update(work.exec, &mut self.world, scene);
         match changes.geometry {
             GeometryChange::None => {}
             GeometryChange::Moved => {
-                self.base.refit(&self.world);
-                self.seen = None;
+                self.culler.refit(&self.world.clusters);
+                self.shelf.forget_owners();
             }
             GeometryChange::Replaced => {
-                self.base = BaseImage::new(&self.world);
-                self.seen = None;
+                self.culler = Culler::new(&self.world.clusters);
+                self.shelf.replace_world(&self.world);
+                self.load = ImageLoad::guess(&self.world);
             }
         }
         if changes.shading || changes.background {
-            self.is_lit = false;
+            self.shelf.forget_colours();
         }
+        work.stages.cull += work.allowance.elapsed_ms() - since;
     }
 
-    /// Finds out who owns which pixel of a view.
-    fn look(
-        &mut self,
-        exec: Exec,
-        view: &View,
-        allowance: &Allowance<'_>,
-        stages: &mut StageTimes,
-    ) {
-        let since = allowance.elapsed_ms();
-        // Which clusters can be seen at all?
-        self.base.cull(view);
-        let culled = allowance.elapsed_ms();
-        stages.cull += culled - since;
-
-        self.base
-            .rasterize(exec, &self.world, view, &mut *self.backend);
-        stages.raster += allowance.elapsed_ms() - culled;
-        self.seen = Some(*view);
-        self.is_lit = false;
+    /// Whether the image shown is one of the scene as it is, from its camera.
+    fn is_current(&self, scene: &Scene, target: &Target<'_>) -> bool {
+        self.placement.is_up_to_date(scene)
+            && self.shelf.shown().is_some_and(|picture| {
+                picture.shows(&self.view(scene, target).reduced(picture.divisor))
+            })
     }
 
-    /// Gives the first image of a view its colours, and makes the list of what could be refined.
-    fn light(
-        &mut self,
-        exec: Exec,
-        view: &View,
-        allowance: &Allowance<'_>,
-        stages: &mut StageTimes,
-    ) {
-        let refines_first = self.refines_first();
-        let backend = &mut *self.backend;
-        let mut since = allowance.elapsed_ms();
-        let mut lap = |stage: &mut f64| {
-            let now = allowance.elapsed_ms();
-            *stage += now - since;
-            since = now;
-        };
-
-        // Only vertices of triangles that own a pixel are illuminated.
-        self.base
-            .shade(exec, self.method, &self.world, view, backend);
-        lap(&mut stages.shade);
-
-        // On a backend that cannot repaint, refinement comes first.
-        if refines_first {
-            self.refine_first.begin();
-        } else {
-            self.base
-                .resolve(exec, self.method, &self.world, view, backend);
+    /// Spends what is left of the budget on the image shown, less what handing it over will take. Returns the milliseconds that
+    /// drawing took, where that comes after refinement and was done.
+    fn refine(&mut self, target: Option<&Target<'_>>, work: &mut Work<'_>) -> Option<f64> {
+        if !self.method.is_progressive() || self.shelf.in_hand().is_some() {
+            return None;
         }
-        lap(&mut stages.resolve);
-
-        // Which triangles can hold a highlight, and what is worth refining?
-        if self.method.is_progressive() {
-            self.base.classify(exec, &self.world, view, backend);
-            self.refinement.collect_candidates(
-                exec,
-                self.method,
-                &self.world,
-                view,
-                &self.base,
-                backend,
-            );
-        } else {
-            self.refinement.clear();
-        }
-        lap(&mut stages.classify);
-
-        self.is_lit = true;
+        let since = work.allowance.elapsed_ms();
+        let drawing_ms = self.refine_shown(target, work);
+        let drawing = drawing_ms.unwrap_or(0.0);
+        work.stages.refine += work.allowance.elapsed_ms() - since - drawing;
+        work.stages.resolve += drawing;
+        drawing_ms
     }
 
-    /// Whether everything is drawn once, after refinement.
-    fn refines_first(&self) -> bool {
-        self.method.is_progressive() && !self.backend.capabilities().refines_in_place()
-    }
-
-    /// Spends what is left of the budget, less what handing the image over will take. Returns the milliseconds that drawing
-    /// took, where that comes after refinement and was done.
-    fn refine(
-        &mut self,
-        exec: Exec,
-        view: &View,
-        allowance: &mut Allowance<'_>,
-        target: &Target<'_>,
-    ) -> Option<f64> {
-        let refines_first = self.refines_first();
-        let mut stage = super::refinement::Stage {
+    fn refine_shown(&mut self, target: Option<&Target<'_>>, work: &mut Work<'_>) -> Option<f64> {
+        let Work {
             exec,
+            allowance,
+            predicted,
+            ..
+        } = work;
+        let picture = self.shelf.shown_mut()?;
+        let mut easel = Easel {
+            exec: *exec,
+            method: self.method,
             world: &self.world,
-            view,
-            base: &self.base,
-            backend: &mut *self.backend,
+            costs: &mut self.costs,
+            predicted,
+            target,
         };
-        if refines_first {
-            let pixels = u64::from(view.width) * u64::from(view.height);
-            let presenting_ms = self.presenting.predict_ms(pixels) + MARGIN_MS;
-            return self.refine_first.frame(
-                &mut self.refinement,
-                &mut stage,
-                allowance,
-                presenting_ms,
-            );
+        picture.refine(&mut easel, allowance)
+    }
+
+    /// Hands the image shown over; returns the number of pixels written.
+    fn hand_over(&mut self, work: &mut Work<'_>, target: &mut Target<'_>) -> u64 {
+        let since = work.allowance.elapsed_ms();
+        let asked = [target.width(), target.height()];
+        if asked.iter().any(|&side| side > MAX_IMAGE_SIDE) {
+            return 0;
         }
-        loop {
-            let pending = stage.backend.pending_pixels(target);
-            allowance.reserve_ms(self.presenting.predict_ms(pending) + MARGIN_MS);
-            if !self.refinement.step(&mut stage, allowance) {
-                return None;
+        // An image for a target of another size does not fit into this one.
+        let shown = self.shelf.shown_mut().filter(|picture| {
+            picture.size() == Some(asked.map(|side| side.div_ceil(picture.divisor)))
+        });
+        let divisor = shown.as_ref().map_or(1, |picture| picture.divisor);
+        let pixels = match shown {
+            Some(picture) => self.handover.present(work.exec, picture, target),
+            None => {
+                let background = self.world.background;
+                self.handover
+                    .fill(work.exec, background, self.encoding, target)
+            }
+        };
+        self.handover.note(target);
+        let ms = work.allowance.elapsed_ms() - since;
+        work.stages.present += ms;
+        work.predicted.present += Handover::learn(&mut self.costs, divisor, pixels, ms);
+        pixels
+    }
+
+    /// Goes on with the images of the last frame in spare time. Whether they are final.
+    pub(super) fn spend_spare_time(&mut self, work: &mut Work<'_>) -> bool {
+        let mut is_first = true;
+        while let Some(image) = self.unfinished_image() {
+            if !(work.allowance.begins_image() && self.draw_image(&image, None, is_first, work)) {
+                return false;
+            }
+            is_first = false;
+        }
+        self.refine(None, work);
+        self.is_final()
+    }
+
+    /// Whether there is an image, and nothing left to be done about it.
+    pub(super) fn is_final(&self) -> bool {
+        let is_final =
+            |picture: &Picture| picture.view().is_some() && picture.has_converged(self.method);
+        self.unfinished_image().is_none() && self.shelf.shown().is_some_and(is_final)
+    }
+
+    /// The first image in hand; or, when the view of the last frame is shown at a lower resolution, that at the full one.
+    fn unfinished_image(&self) -> Option<Commission> {
+        if let Some((size, view, divisor)) = self.shelf.view_in_hand() {
+            return Some(Commission {
+                size,
+                view,
+                divisor,
+            });
+        }
+        let view = self.last_view?;
+        let is_reduced = self.method.divisor().is_none()
+            && self.shelf.shown_size() == Some(Size::Reduced)
+            && !self.shelf.shows(Size::Full, &view);
+        is_reduced.then_some(Commission {
+            size: Size::Full,
+            view,
+            divisor: 1,
+        })
+    }
+
+    fn outcome(&self, is_current: bool, work: &Work<'_>, has_drawn: bool) -> Outcome {
+        let record = work.allowance.record();
+        let is_new = record.images > 0;
+        match self.shelf.shown() {
+            None => Outcome::Stale { age: None },
+            Some(picture) if !is_current => Outcome::Stale {
+                age: Some(picture.age(self.frames)),
+            },
+            Some(picture) if picture.divisor != self.method.divisor().unwrap_or(1) => {
+                Outcome::Reduced
+            }
+            Some(_) if !is_new && work.allowance.spent_units() == 0 && !has_drawn => {
+                Outcome::Unchanged
+            }
+            Some(picture) if picture.has_converged(self.method) => Outcome::Complete,
+            Some(_) if is_new && work.allowance.spent_units() == 0 => Outcome::BaseOnly,
+            Some(_) => Outcome::Refined,
+        }
+    }
+
+    /// What has been done, and what the image shown consists of.
+    fn report(&self, budget: Budget, work: &Work<'_>) -> FrameStats {
+        let mut stats = FrameStats {
+            frame: self.frames,
+            frame_ms: work.allowance.elapsed_ms(),
+            triangles: self.world.triangles.len() as u64,
+            work_units: work.allowance.spent_units(),
+            record: work.allowance.record(),
+            stage_ms: work.stages,
+            predicted_ms: work.predicted,
+            ..FrameStats::empty(budget)
+        };
+        if let Some(picture) = self.shelf.shown() {
+            stats.divisor = picture.divisor;
+            // An image that is being drawn anew, though its colours still are the old ones, has lost what was known about it.
+            if picture.view().is_some() {
+                picture.base.report(&mut stats);
+                picture.refinement.report(self.method, &mut stats);
+                stats.converged = picture.has_converged(self.method)
+                    && picture.divisor == self.method.divisor().unwrap_or(1);
             }
         }
+        stats
     }
 }

@@ -1,6 +1,6 @@
 //! What happened in a frame.
 
-use crate::schedule::Budget;
+use crate::schedule::{Budget, FrameRecord};
 use serde::Serialize;
 use std::fmt;
 
@@ -12,8 +12,17 @@ pub enum Outcome {
     Complete,
     /// The first image was drawn, and refined as far as the budget went.
     Refined,
-    /// There was time for the first image only; if even that took longer than the budget, the frame is late.
+    /// There was time for the first image only.
     BaseOnly,
+    /// The first image at full resolution would not have fitted into the budget: this one has a lower
+    /// [resolution](FrameStats::divisor), and was enlarged.
+    Reduced,
+    /// There was no time for a first image: it goes on in the next frame.
+    Stale {
+        /// The image shown is of the scene and camera of so many frames ago; `None` if it is the background, because
+        /// there is no image yet.
+        age: Option<u64>,
+    },
     /// Nothing was drawn: the image was final already, or there was no time; on a backend that draws everything once, also
     /// if a better image would take longer to draw than the budget.
     Unchanged,
@@ -27,6 +36,8 @@ impl Outcome {
             Self::Complete => "complete",
             Self::Refined => "refined",
             Self::BaseOnly => "base_only",
+            Self::Reduced => "reduced",
+            Self::Stale { .. } => "stale",
             Self::Unchanged => "unchanged",
         }
     }
@@ -146,6 +157,10 @@ pub struct FrameStats {
     pub outcome: Outcome,
     /// Whether the image is final.
     pub converged: bool,
+    /// The image has a `divisor`-th of the target's width and height: 1 is the full resolution.
+    pub divisor: u32,
+    /// What time had to say about the frame: enough to [replay](Budget::Replay) it.
+    pub record: FrameRecord,
     /// Estimated root mean square difference from per-pixel Phong shading, in 8-bit codes over covered pixels; 0
     /// for [`Method::Phong`](super::Method::Phong). NaN for flat and Gouraud shading, where nothing is estimated.
     pub estimated_error: f64,
@@ -176,6 +191,8 @@ pub struct FrameStats {
     pub pixels_written: u64,
     /// Milliseconds by stage.
     pub stage_ms: StageTimes,
+    /// What the stages that were completed in this frame had been predicted to take. Of refinement, what was done of it.
+    pub predicted_ms: StageTimes,
     /// What was not needed.
     pub skipped: Skipped,
 }
@@ -189,6 +206,8 @@ impl FrameStats {
             budget,
             outcome: Outcome::BaseOnly,
             converged: false,
+            divisor: 1,
+            record: FrameRecord::default(),
             estimated_error: f64::NAN,
             triangles: 0,
             triangles_drawn: 0,
@@ -203,6 +222,7 @@ impl FrameStats {
             work_units: 0,
             pixels_written: 0,
             stage_ms: StageTimes::default(),
+            predicted_ms: StageTimes::default(),
             skipped: Skipped::default(),
         }
     }
@@ -212,7 +232,7 @@ impl FrameStats {
     pub fn overshoot_ms(&self) -> Option<f64> {
         match self.budget {
             Budget::Millis(ms) => Some(self.frame_ms - ms),
-            Budget::Work(_) | Budget::Unlimited => None,
+            _ => None,
         }
     }
 }

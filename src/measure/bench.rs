@@ -17,7 +17,7 @@ use super::metrics::ErrorHistogram;
 use super::reference::ReferenceImage;
 use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
-use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method, StageTimes};
+use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method, Overrun, StageTimes};
 use crate::output::{Encoding, Frame};
 use crate::scene::{Camera, Scene};
 use crate::schedule::Budget;
@@ -190,6 +190,7 @@ pub fn bench(
             encoding: options.encoding,
             simd: options.simd,
             clock: Arc::clone(&options.clock),
+            overrun: Overrun::BeLate,
             ..EngineOptions::default()
         },
     )?;
@@ -322,7 +323,7 @@ impl Totals {
         let (budget_ms, budget_work) = match options.budget {
             Budget::Millis(ms) => (Some(ms), None),
             Budget::Work(units) => (None, Some(units)),
-            Budget::Unlimited => (None, None),
+            Budget::Error(_) | Budget::Unlimited | Budget::Replay(_) => (None, None),
         };
         let overshoot = |percent| budget_ms.map(|budget| quantile(times, percent) - budget);
         let mut stage_ms = StageTimes::default();

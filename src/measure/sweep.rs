@@ -13,7 +13,7 @@
 use super::{ErrorReport, ReferenceImage};
 use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
-use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method};
+use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method, Overrun};
 use crate::output::{Encoding, Frame};
 use crate::scene::Scene;
 use crate::schedule::Budget;
@@ -78,6 +78,7 @@ impl SweepOptions {
                 threads: self.threads,
                 simd: self.simd,
                 clock: Arc::clone(&self.clock),
+                overrun: Overrun::BeLate,
                 ..EngineOptions::default()
             },
         )

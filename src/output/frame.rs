@@ -1,7 +1,7 @@
 //! The image an engine renders into.
 
 use super::Encoding;
-use super::target::{PIXEL_BYTES, Stamp, Target};
+use super::target::{ChannelOrder, PIXEL_BYTES, Stamp, Target};
 
 /// An 8-bit RGBA image, rows from the top, opaque.
 #[derive(Clone, Debug)]
@@ -91,10 +91,20 @@ impl Frame {
     /// Lets `write` bring the frame up to date. What it [marks](Target::mark) the target with is what the frame holds
     /// from then on.
     pub fn write<T>(&mut self, write: impl FnOnce(&mut Target<'_>) -> T) -> T {
+        self.write_in_order(ChannelOrder::default(), write)
+    }
+
+    /// As [`write`](Self::write), the bytes of a pixel being in another order.
+    pub(crate) fn write_in_order<T>(
+        &mut self,
+        order: ChannelOrder,
+        write: impl FnOnce(&mut Target<'_>) -> T,
+    ) -> T {
         let stride = self.width as usize * PIXEL_BYTES;
         let bytes = self.pixels.as_flattened_mut();
         let mut target = Target::with_stride(bytes, self.width, self.height, stride)
             .expect("a frame has as many bytes as its size says")
+            .with_order(order)
             .with_stamp(self.stamp);
         let result = write(&mut target);
         self.stamp = target.stamp();

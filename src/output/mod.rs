@@ -3,6 +3,7 @@
 pub mod apng;
 pub mod encode;
 mod encoding;
+pub mod enlarge;
 pub mod frame;
 mod interpolation;
 pub mod png;
@@ -15,5 +16,5 @@ pub use encoding::Encoding;
 pub use frame::Frame;
 pub use interpolation::Interpolation;
 pub use png::SaveError;
-pub use target::{ChannelOrder, Stamp, Target, TargetError};
+pub use target::{ChannelOrder, Rect, Stamp, Target, TargetError};
 pub use timing::{FrameRate, Timing};

@@ -5,8 +5,13 @@
 //!
 //! A target says what it holds already, and pixels that are right are not written again: see [`Target::with_age`].
 
+use crate::parallel::Exec;
+
 /// Bytes of a pixel.
 pub const PIXEL_BYTES: usize = 4;
+
+/// Rows that one task fills.
+const FILLED_ROWS: usize = 64;
 
 /// Bytes of a row of pixels without a gap. Where that leaves `usize`, no memory is large enough for it either.
 fn row_bytes(width: u32) -> usize {
@@ -60,6 +65,19 @@ pub struct Stamp {
     pub writer: u64,
     /// The writer's count when it wrote.
     pub serial: u64,
+}
+
+/// Some pixels of an image, never empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rect {
+    /// The leftmost column.
+    pub x: u32,
+    /// The topmost row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
 }
 
 /// Memory that an image is handed over into.
@@ -200,6 +218,36 @@ impl<'a> Target<'a> {
     /// For backends: notes that the target now holds the image `stamp`, or one that is not known.
     pub fn mark(&mut self, stamp: Option<Stamp>) {
         self.stamp = stamp;
+    }
+
+    /// All of its pixels; `None` when it has none.
+    #[must_use]
+    pub fn rect(&self) -> Option<Rect> {
+        let whole = Rect {
+            x: 0,
+            y: 0,
+            width: self.width,
+            height: self.height,
+        };
+        (self.width > 0 && self.height > 0).then_some(whole)
+    }
+
+    /// Gives all pixels one colour, in the target's order of bytes. What it holds is nobody's image then.
+    pub fn fill(&mut self, exec: Exec, colour: [u8; 4]) {
+        self.stamp = None;
+        let (width, stride) = (row_bytes(self.width), self.stride);
+        if self.rect().is_none() {
+            return;
+        }
+        let size = stride.saturating_mul(FILLED_ROWS);
+        let rows = self.height as usize;
+        exec.for_each_chunk(self.bytes, size, |task, band| {
+            let left = rows.saturating_sub(task * FILLED_ROWS);
+            for row in band.chunks_mut(stride).take(left) {
+                let (pixels, _) = row[..width].as_chunks_mut();
+                pixels.fill(colour);
+            }
+        });
     }
 
     /// For backends: all bytes. Row `y` begins at `y * stride`.

@@ -19,7 +19,7 @@ use crate::output::Encoding;
 use glam::{DMat4, DVec3, DVec4};
 
 /// Where the viewer is, in world space.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Eye {
     /// At a point (perspective).
     Point([f32; 3]),
@@ -27,8 +27,20 @@ pub enum Eye {
     Direction([f32; 3]),
 }
 
+impl Eye {
+    /// What tells it from others, bit for bit.
+    fn bits(self) -> (bool, [u32; 3]) {
+        match self {
+            Self::Point(p) => (true, p.map(f32::to_bits)),
+            Self::Direction(d) => (false, d.map(f32::to_bits)),
+        }
+    }
+}
+
 /// Everything about a view that the passes need.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// Views are equal if they are bit for bit: so one of a camera at no number at all is equal to itself.
+#[derive(Clone, Copy, Debug)]
 pub struct View {
     /// Image width in pixels.
     pub width: u32,
@@ -41,6 +53,17 @@ pub struct View {
     /// How the image stores light.
     pub encoding: Encoding,
 }
+
+impl PartialEq for View {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |view: &Self| view.pixel_from_world.to_cols_array().map(f64::to_bits);
+        (self.width, self.height, self.encoding) == (other.width, other.height, other.encoding)
+            && self.eye.bits() == other.eye.bits()
+            && bits(self) == bits(other)
+    }
+}
+
+impl Eq for View {}
 
 /// A perspective eye farther away than this, in world units, is shaded as if it were infinitely far, like a light:
 /// squares of its coordinates would leave the range of `f32`.
@@ -102,6 +125,20 @@ impl View {
     #[must_use]
     pub fn with_encoding(self, encoding: Encoding) -> Self {
         Self { encoding, ..self }
+    }
+
+    /// The same view at a lower resolution: each pixel stands for `divisor` by `divisor` pixels, those of the last column and row
+    /// perhaps for fewer. Zero counts as one.
+    #[must_use]
+    pub fn reduced(self, divisor: u32) -> Self {
+        let divisor = divisor.max(1);
+        let shrink = DVec3::new(1.0 / f64::from(divisor), 1.0 / f64::from(divisor), 1.0);
+        Self {
+            width: self.width.div_ceil(divisor),
+            height: self.height.div_ceil(divisor),
+            pixel_from_world: DMat4::from_scale(shrink) * self.pixel_from_world,
+            ..self
+        }
     }
 
     /// A world point in homogeneous pixel space.

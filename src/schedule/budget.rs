@@ -1,22 +1,45 @@
 //! What a frame may cost, and how much of it is left.
 
+use super::{CancelToken, FrameRecord};
 use crate::clock::Clock;
 
 /// What one frame may cost.
 ///
-/// The first image of a frame, the Gouraud-shaded one, is always completed; the budget decides how much refinement
-/// follows it.
+/// # The promise
+///
+/// A frame under [`Millis`](Self::Millis) returns by its deadline, handing the image over included. The clock is looked at
+/// between pieces of work of some 50 microseconds.
+///
+/// 1. When the first image, Gouraud-shaded, fits into the budget, it is drawn, and what is left of the time refines it. The next
+///    frame of a still view goes on from there.
+/// 2. When it does not fit because of its pixels, it is drawn at a **lower resolution**, a half to a quarter of the width and height, and
+///    enlarged ([`Outcome::Reduced`](crate::frame::Outcome::Reduced)). While the view stays, the following frames draw it at full
+///    resolution.
+/// 3. When it does not fit because of its triangles, it is drawn **over several frames**, each going on where the last one had to stop,
+///    of the camera and scene as they were when it was begun. Until it is complete the image before it stays
+///    ([`Outcome::Stale`](crate::frame::Outcome::Stale)); without one the frame shows the background.
+///
+/// Nothing is silently left out of the picture, and the outcome says which case it was. Four things are not interrupted: placing objects that have moved,
+/// making ready for a replaced scene or another image size, colouring a first image and handing an image over. The last two are
+/// predicted, and not begun when they would not end in time. A budget less than handing over takes cannot be
+/// kept; the frame is as little late as can be. Backends other than the software one draw a first image as a
+/// whole, late if need be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
-    /// Wall-clock milliseconds from the call of `render` to its return, by the engine's clock. Refinement stops in time;
-    /// a first image that takes longer is completed late, and the outcome says so.
+    /// Wall-clock milliseconds from the call of `render` to its return, by the engine's clock. Zero buys a first image at full resolution,
+    /// however long that takes, and no refinement.
     Millis(f64),
     /// Work units: nominal nanoseconds of refinement (see [`cost`](super::cost)). The result is the same, bit for
-    /// bit, for any number of threads and at any speed of the machine. A step is done whole or not at all, and the best
+    /// bit, for any number of threads and at any speed of the machine. The first image is always completed and costs none. A step is done whole or not at all, and the best
     /// one comes first: less than some 20,000 units a frame (100,000 with a hundred lights) may get nowhere.
     Work(u64),
+    /// Refine until the estimated root mean square error is at most so many 8-bit codes; see
+    /// [`FrameStats::estimated_error`](crate::frame::FrameStats::estimated_error).
+    Error(f64),
     /// Refine until the image equals per-pixel Phong shading.
     Unlimited,
+    /// What a frame with another budget did, as its [`FrameStats::record`](crate::frame::FrameStats::record) has it.
+    Replay(FrameRecord),
 }
 
 impl Budget {
@@ -28,75 +51,174 @@ impl Budget {
 }
 
 /// A budget being spent.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Allowance<'a> {
     budget: Budget,
     clock: &'a dyn Clock,
+    cancel: &'a CancelToken,
     start_ms: f64,
     reserve_ms: f64,
+    ms_per_unit: f64,
+    is_first_image_bounded: bool,
     spent_units: u64,
-    steps: u64,
     is_over: bool,
+    /// What has been done so far.
+    done: FrameRecord,
 }
 
 impl<'a> Allowance<'a> {
     /// Starts to spend `budget` at `start_ms` of `clock`.
     #[must_use]
-    pub fn new(budget: Budget, clock: &'a dyn Clock, start_ms: f64) -> Self {
+    pub fn new(
+        budget: Budget,
+        clock: &'a dyn Clock,
+        start_ms: f64,
+        cancel: &'a CancelToken,
+    ) -> Self {
         Self {
             budget,
             clock,
+            cancel,
             start_ms,
             reserve_ms: 0.0,
+            ms_per_unit: 1e-6,
+            is_first_image_bounded: true,
             spent_units: 0,
-            steps: 0,
             is_over: false,
+            done: FrameRecord::default(),
         }
     }
 
-    /// Keeps `ms` of a wall-clock budget for what comes after refinement.
+    /// The budget with its first images completed even if they are late.
+    #[must_use]
+    pub fn with_whole_first_images(self) -> Self {
+        Self {
+            is_first_image_bounded: false,
+            ..self
+        }
+    }
+
+    /// Keeps `ms` of a wall-clock budget for what comes afterwards.
     pub fn reserve_ms(&mut self, ms: f64) {
         self.reserve_ms = ms.max(0.0);
     }
 
+    /// Says how long a nominal nanosecond of refinement will take from now on.
+    pub fn set_ms_per_unit(&mut self, ms: f64) {
+        self.ms_per_unit = ms.max(0.0);
+    }
+
+    /// The wall-clock milliseconds within which a first image has to be drawn; `None` where it may take as long as it takes.
+    #[must_use]
+    pub fn first_image_ms(&self) -> Option<f64> {
+        match self.budget {
+            Budget::Millis(ms) if ms > 0.0 && self.is_first_image_bounded => Some(ms),
+            _ => None,
+        }
+    }
+
+    /// The divisor for a first image that a replayed frame has to have.
+    #[must_use]
+    pub fn replayed_divisor(&self) -> Option<u32> {
+        match self.budget {
+            Budget::Replay(record) => Some(record.divisor),
+            _ => None,
+        }
+    }
+
+    /// Notes the divisor chosen.
+    pub fn note_divisor(&mut self, divisor: u32) {
+        self.done.divisor = divisor;
+    }
+
+    /// Whether a first image may be begun, or gone on with: notes that it is.
+    #[must_use]
+    pub fn begins_image(&mut self) -> bool {
+        let may_begin = match self.budget {
+            Budget::Replay(record) => record.images > self.done.images || record.is_image_begun,
+            _ => self.goes_on(),
+        };
+        self.done.is_image_begun |= may_begin;
+        may_begin
+    }
+
+    /// Whether the first image in hand may be gone on with: asked between pieces of work, by any thread.
+    #[must_use]
+    pub fn goes_on(&self) -> bool {
+        match (self.budget, self.first_image_ms()) {
+            (Budget::Replay(record), _) => record.images > self.done.images,
+            (_, Some(ms)) => {
+                !self.cancel.is_cancelled() && self.elapsed_ms() + self.reserve_ms <= ms
+            }
+            _ => true,
+        }
+    }
+
+    /// Whether something of the first image in hand that takes `ms` milliseconds, and cannot be interrupted, may be begun.
+    #[must_use]
+    pub fn has_time_for(&self, ms: f64) -> bool {
+        match self.first_image_ms() {
+            Some(budget) => self.goes_on() && self.elapsed_ms() + ms <= budget,
+            None => self.goes_on(),
+        }
+    }
+
+    /// Whether the first image in hand is to be completed in this frame, as far as a replay has a say in it.
+    #[must_use]
+    pub fn completes_image(&self) -> bool {
+        !matches!(self.budget, Budget::Replay(record) if record.images <= self.done.images)
+    }
+
+    /// Notes that the first image in hand is complete.
+    pub fn note_image(&mut self) {
+        self.done.images += 1;
+        self.done.is_image_begun = false;
+    }
+
     /// Admits a step of `units` nominal nanoseconds, or ends the frame's refinement: a wall-clock budget admits it while
-    /// the deadline, less the reserve and the step's nominal time, lies ahead.
+    /// the deadline, less the reserve and what the step will take, lies ahead.
     ///
     /// **After the first refusal nothing is admitted any more.** So what a frame does is the beginning of what an unlimited
-    /// one does, whatever the clock said, and the number of [`steps`](Self::steps) says how much of it.
+    /// one does, whatever the clock said, and the number of steps says how much of it.
     #[must_use]
     pub fn admit(&mut self, units: u64) -> bool {
         self.is_over = self.is_over || !self.has_room_for(units);
-        self.steps += u64::from(!self.is_over);
+        self.done.steps += u64::from(!self.is_over);
         !self.is_over
     }
 
     fn has_room_for(&self, units: u64) -> bool {
+        if self.cancel.is_cancelled() && !matches!(self.budget, Budget::Replay(_)) {
+            return false;
+        }
         match self.budget {
-            Budget::Unlimited => true,
+            Budget::Unlimited | Budget::Error(_) => true,
             Budget::Work(total) => self.spent_units.saturating_add(units) <= total,
+            Budget::Replay(record) => self.done.steps < record.steps,
             Budget::Millis(ms) => {
-                let needed = units as f64 * 1e-6 + self.reserve_ms;
+                let needed = units as f64 * self.ms_per_unit + self.reserve_ms;
                 self.elapsed_ms() + needed <= ms
             }
         }
+    }
+
+    /// Whether an image whose estimated error is `rmse` codes is good enough.
+    #[must_use]
+    pub fn is_satisfied_by(&self, rmse: f64) -> bool {
+        matches!(self.budget, Budget::Error(target) if rmse <= target)
     }
 
     /// Nominal nanoseconds that are left.
     #[must_use]
     pub fn units_left(&self) -> u64 {
         match self.budget {
-            Budget::Unlimited => u64::MAX,
+            Budget::Unlimited | Budget::Error(_) | Budget::Replay(_) => u64::MAX,
             Budget::Work(total) => total.saturating_sub(self.spent_units),
-            // The conversion saturates at zero.
-            Budget::Millis(ms) => ((ms - self.elapsed_ms() - self.reserve_ms) * 1e6) as u64,
+            // The conversion saturates, and makes zero of NaN.
+            Budget::Millis(ms) => {
+                ((ms - self.elapsed_ms() - self.reserve_ms) / self.ms_per_unit) as u64
+            }
         }
-    }
-
-    /// How many steps were admitted.
-    #[must_use]
-    pub fn steps(&self) -> u64 {
-        self.steps
     }
 
     /// Books `units` of finished work.
@@ -108,6 +230,12 @@ impl<'a> Allowance<'a> {
     #[must_use]
     pub fn spent_units(&self) -> u64 {
         self.spent_units
+    }
+
+    /// What has been done so far, for [`Budget::Replay`].
+    #[must_use]
+    pub fn record(&self) -> FrameRecord {
+        self.done
     }
 
     /// Milliseconds since the start; zero when the clock has run backwards.
@@ -122,46 +250,106 @@ mod tests {
     use super::*;
     use crate::clock::ManualClock;
 
+    fn start<'a>(budget: Budget, clock: &'a ManualClock, cancel: &'a CancelToken) -> Allowance<'a> {
+        Allowance::new(budget, clock, clock.now_ms(), cancel)
+    }
+
     #[test]
     fn no_work_is_admitted_past_the_deadline_or_into_the_reserve() {
-        let clock = ManualClock::default();
-        let mut allowance = Allowance::new(Budget::from_millis(2.0), &clock, clock.now_ms());
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
+        let mut allowance = start(Budget::from_millis(2.0), &clock, &cancel);
         allowance.reserve_ms(0.5);
         assert!(allowance.admit(1_500_000));
         clock.advance_ms(1.5);
-        assert!(allowance.admit(0));
+        assert!(allowance.admit(0) && allowance.goes_on());
         clock.advance_ms(0.001);
-        assert!(!allowance.admit(0));
-        assert_eq!(allowance.steps(), 2);
+        assert!(!allowance.admit(0) && !allowance.goes_on());
+        assert_eq!(allowance.record().steps, 2);
+    }
+
+    #[test]
+    fn units_take_as_long_as_they_were_found_to() {
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
+        let mut allowance = start(Budget::from_millis(2.0), &clock, &cancel);
+        allowance.set_ms_per_unit(0.5e-6);
+        assert_eq!(allowance.units_left(), 4_000_000);
+        assert!(allowance.admit(4_000_000) && !allowance.admit(4_000_001));
     }
 
     #[test]
     fn the_first_refusal_is_the_last_word() {
-        let clock = ManualClock::default();
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
         clock.advance_ms(10.0);
-        let mut allowance = Allowance::new(Budget::from_millis(2.0), &clock, clock.now_ms());
+        let mut allowance = start(Budget::from_millis(2.0), &clock, &cancel);
         assert!(!allowance.admit(2_000_001));
         assert!(!allowance.admit(1));
-        allowance = Allowance::new(Budget::Work(100), &clock, 0.0);
+        allowance = start(Budget::Work(100), &clock, &cancel);
         assert!(!allowance.admit(101));
         assert!(!allowance.admit(1));
-        assert_eq!(allowance.steps(), 0);
+        assert_eq!(allowance.record().steps, 0);
     }
 
     #[test]
     fn work_budgets_do_not_look_at_the_clock() {
-        let clock = ManualClock::default();
-        let mut allowance = Allowance::new(Budget::Work(100), &clock, 0.0);
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
+        let mut allowance = start(Budget::Work(100), &clock, &cancel);
         clock.advance_ms(1e6);
+        assert!(allowance.begins_image() && allowance.has_time_for(1e9));
         assert!(allowance.admit(100));
         allowance.spend(60);
-        assert!(!allowance.admit(41));
         assert_eq!(allowance.units_left(), 40);
+        assert!(!allowance.admit(41));
+    }
+
+    #[test]
+    fn a_cancelled_token_ends_refinement_of_any_budget_and_first_images_under_a_deadline() {
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
+        for budget in [
+            Budget::Unlimited,
+            Budget::Work(100),
+            Budget::Millis(1.0),
+            Budget::Error(0.1),
+        ] {
+            let mut allowance = start(budget, &clock, &cancel);
+            assert!(allowance.admit(1) && allowance.goes_on());
+            cancel.cancel();
+            assert!(!allowance.admit(1));
+            assert_eq!(allowance.goes_on(), !matches!(budget, Budget::Millis(_)));
+            cancel.reset();
+        }
+    }
+
+    #[test]
+    fn a_replay_does_as_much_as_was_done() {
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
+        let mut timed = start(Budget::Millis(2.0), &clock, &cancel);
+        timed.note_divisor(2);
+        assert!(timed.begins_image());
+        timed.note_image();
+        assert!(timed.admit(10) && timed.admit(10));
+        clock.advance_ms(5.0);
+        assert!(!timed.admit(1) && !timed.begins_image());
+        let record = timed.record();
+        let mut replay = start(Budget::Replay(record), &clock, &cancel);
+        replay.note_divisor(replay.replayed_divisor().expect("it is a replay"));
+        assert!(replay.begins_image() && replay.goes_on());
+        replay.note_image();
+        assert!(!replay.begins_image() && !replay.goes_on());
+        assert!(replay.admit(u64::MAX) && replay.admit(1) && !replay.admit(0));
+        assert_eq!(replay.record(), record);
     }
 
     #[test]
     fn odd_milliseconds_are_no_time_at_all() {
         assert_eq!(Budget::from_millis(f64::NAN), Budget::Millis(0.0));
         assert_eq!(Budget::from_millis(-3.0), Budget::Millis(0.0));
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
+        // But for a first image.
+        assert!(start(Budget::Millis(0.0), &clock, &cancel).begins_image());
+        for odd in [f64::NAN, -1.0] {
+            let mut allowance = start(Budget::Millis(odd), &clock, &cancel);
+            assert!(!allowance.admit(1));
+            assert_eq!(allowance.units_left(), 0);
+        }
     }
 }

@@ -43,6 +43,23 @@ pub const FIRST_TRIANGLE_NS: f32 = 20.0;
 /// See [`FIRST_TRIANGLE_NS`]: a part for each pixel of the image, as if a quarter of them were covered.
 pub const FIRST_PIXEL_NS: f32 = 0.75;
 
+/// Stages of a first image, from which the [cost model](super::CostModel) starts: looking at a cluster.
+pub const CULL_CLUSTER_NS: f32 = 10.0;
+/// Rasterizing: a part for each triangle handed over.
+pub const RASTER_TRIANGLE_NS: f32 = 60.0;
+/// See [`RASTER_TRIANGLE_NS`]: a part for each pixel of the image.
+pub const RASTER_PIXEL_NS: f32 = 0.2;
+/// See [`RASTER_TRIANGLE_NS`]: a part for each pixel that something covers.
+pub const RASTER_COVERED_NS: f32 = 1.5;
+/// Finding out that a vertex is to be illuminated, and where it is.
+pub const FIND_VERTEX_NS: f32 = 5.0;
+/// Colouring a first image: a part for each triangle that owns a pixel.
+pub const RESOLVE_TRIANGLE_NS: f32 = 30.0;
+/// See [`RESOLVE_TRIANGLE_NS`]: a part for each pixel covered, unless it is shaded on its own.
+pub const RESOLVE_PIXEL_NS: f32 = 1.8;
+/// Enlarging an image: a part for each pixel written.
+pub const ENLARGE_PIXEL_NS: f32 = 0.6;
+
 /// Drawing everything once, on a backend that cannot repaint: a part for each triangle, until the engine has measured it.
 pub const DRAW_TRIANGLE_NS: f32 = 2700.0;
 /// See [`DRAW_TRIANGLE_NS`]: a part for each pixel that triangles cover, hidden ones included.
@@ -100,4 +117,10 @@ pub fn bounds(lights: usize) -> f32 {
 #[must_use]
 pub fn light_saved(pixels: f32) -> f32 {
     pixels * PHONG_PIXEL_LIGHT_NS
+}
+
+/// Shading a pixel of a first image under `lights` lights.
+#[must_use]
+pub fn phong_pixel(lights: usize) -> f32 {
+    PHONG_PIXEL_NS + PHONG_PIXEL_LIGHT_NS * lights as f32
 }

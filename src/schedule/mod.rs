@@ -9,10 +9,18 @@
 //! The scheduler knows candidates by number and what they are worth; triangles are none of its business.
 
 mod budget;
+mod cancel;
 pub mod cost;
+mod ladder;
+mod model;
 mod queue;
 mod rate;
+mod record;
 
 pub use budget::{Allowance, Budget};
+pub use cancel::CancelToken;
+pub use ladder::{DIVISORS, Forecast, Ladder};
+pub use model::{CostModel, Kind, Load, Rate};
 pub use queue::RankedQueue;
 pub use rate::LearnedRate;
+pub use record::FrameRecord;

@@ -31,7 +31,7 @@ use crate::parallel::Exec;
 use crate::refine::estimate::{SAMPLES_AT_ONCE, Samples};
 use crate::refine::{FIRST_LEAVES, Forest, LeafId, SplitOutcome};
 use crate::scene::{View, World};
-use crate::schedule::{Allowance, RankedQueue};
+use crate::schedule::{Allowance, Kind, RankedQueue};
 pub(super) use drawn_once::DrawnLeaves;
 pub(super) use leaves::for_each_leaf;
 pub use leaves::{Leaf, LeafKind};
@@ -310,12 +310,25 @@ impl Refinement {
         }
     }
 
+    /// The kind of work that the next step is.
+    pub(super) fn next_kind(&self) -> Kind {
+        if self.paints.is_empty() {
+            Kind::Plan
+        } else {
+            Kind::Paint
+        }
+    }
+
+    /// Estimated root mean square error of the image in codes.
+    pub(super) fn estimated_error(&self) -> f64 {
+        (self.error_mass.max(0.0) / self.pixels.max(1) as f64).sqrt()
+    }
+
     /// Fills in how far the image has come.
     pub(super) fn report(&self, method: Method, stats: &mut FrameStats) {
-        let covered = self.pixels.max(1) as f64;
         stats.estimated_error = match method {
             Method::Flat | Method::Gouraud => f64::NAN,
-            _ => (self.error_mass.max(0.0) / covered).sqrt(),
+            _ => self.estimated_error(),
         };
         stats.refined = self.counters.refined_phts;
         stats.triangles_subdivided = self.counters.subdivided;

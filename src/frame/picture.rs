@@ -1,0 +1,412 @@
+//! An image in the making: who owns which pixel, colours, and what refinement has come to.
+//!
+//! The **base pass** draws the first image. Its stages follow each other, and all but the last may be interrupted and gone
+//! on with in a later frame, as long as the world stays as it is:
+//!
+//! | [`Pass`] | what comes next | may be interrupted |
+//! |---|---|---|
+//! | `Empty` | cull clusters, then rasterize | no |
+//! | `Rasterizing` | find the owner of every pixel | yes |
+//! | `Lighting` | illuminate the vertices of triangles that own a pixel | yes |
+//! | `Colouring` | give every pixel its colour | yes |
+//! | `Coloured` | show it | |
+//! | `Done` | refine it | yes |
+//!
+//! Colours of the image before stay until `Colouring` begins, so it can be handed over until then. Where it is the image shown, colouring is
+//! not interrupted, lest a part of either is shown.
+
+use super::Method;
+use super::base::BaseImage;
+use super::load::{self, ImageLoad};
+use super::refine_first::RefineFirst;
+use super::refinement::{Refinement, Stage};
+use super::stats::StageTimes;
+use crate::backend::Backend;
+use crate::output::Target;
+use crate::parallel::{Exec, GoOn, Turn};
+use crate::scene::{View, World};
+use crate::schedule::{Allowance, CostModel, Kind, Load};
+use crate::visibility::Culler;
+
+/// How far the base pass has come; see the [module](self).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Pass {
+    Empty,
+    Rasterizing,
+    Lighting,
+    Colouring,
+    Coloured,
+    Done,
+}
+
+/// An image and everything that is known about it.
+#[derive(Debug)]
+pub(super) struct Picture {
+    pub(super) backend: Box<dyn Backend>,
+    pub(super) base: BaseImage,
+    pub(super) refinement: Refinement,
+    /// For a backend that cannot repaint.
+    pub(super) refine_first: RefineFirst,
+    /// What it shows, or will when it is done.
+    view: Option<View>,
+    /// One pixel stands for `divisor` by `divisor` pixels of the target.
+    pub(super) divisor: u32,
+    pass: Pass,
+    /// Whether the stage in hand is yet to be begun.
+    is_fresh: bool,
+    /// What the stage in hand has taken in earlier frames, and in this one so far.
+    stage_ms: f64,
+    /// The frame whose camera and scene it shows; `None` before it is begun.
+    taken_in: Option<u64>,
+}
+
+/// What drawing needs besides the picture itself.
+#[derive(Debug)]
+pub(super) struct Studio<'a> {
+    pub(super) exec: Exec,
+    pub(super) method: Method,
+    pub(super) world: &'a World,
+    pub(super) culler: &'a mut Culler,
+    pub(super) costs: &'a mut CostModel,
+    /// What the image probably consists of.
+    pub(super) load: &'a mut ImageLoad,
+    pub(super) stages: &'a mut StageTimes,
+    /// What the stages that ended in this frame were predicted to take.
+    pub(super) predicted: &'a mut StageTimes,
+}
+
+/// What refining needs besides the picture itself.
+pub(super) struct Easel<'a, 'b> {
+    pub(super) exec: Exec,
+    pub(super) method: Method,
+    pub(super) world: &'a World,
+    pub(super) costs: &'a mut CostModel,
+    /// What was done in this frame was predicted to take.
+    pub(super) predicted: &'a mut StageTimes,
+    /// Where the image will go; nowhere in spare time.
+    pub(super) target: Option<&'a Target<'b>>,
+}
+
+impl Picture {
+    pub(super) fn new(backend: Box<dyn Backend>, world: &World) -> Self {
+        Self {
+            backend,
+            base: BaseImage::new(world),
+            refinement: Refinement::default(),
+            refine_first: RefineFirst::default(),
+            view: None,
+            divisor: 1,
+            pass: Pass::Empty,
+            is_fresh: true,
+            stage_ms: 0.0,
+            taken_in: None,
+        }
+    }
+
+    /// Makes it a picture of another world, of which nothing is known.
+    pub(super) fn replace_world(&mut self, world: &World) {
+        self.base = BaseImage::new(world);
+        self.forget();
+    }
+
+    /// Forgets who owns which pixel, as after objects have moved.
+    pub(super) fn forget(&mut self) {
+        self.enter(Pass::Empty);
+        self.taken_in = None;
+    }
+
+    /// Forgets colours, as after lights have changed.
+    pub(super) fn forget_colours(&mut self) {
+        if self.pass > Pass::Lighting {
+            self.enter(Pass::Lighting);
+        }
+        self.taken_in = None;
+    }
+
+    /// Whether the first image of `view` is complete.
+    pub(super) fn shows(&self, view: &View) -> bool {
+        self.pass == Pass::Done && self.view.as_ref() == Some(view)
+    }
+
+    /// Whether the owners of pixels of `view` are known.
+    pub(super) fn knows_owners(&self, view: &View) -> bool {
+        self.pass >= Pass::Lighting && self.view.as_ref() == Some(view)
+    }
+
+    /// The view whose first image has been begun and not completed.
+    pub(super) fn in_hand(&self) -> Option<View> {
+        self.view.filter(|_| self.is_in_hand())
+    }
+
+    pub(super) fn is_in_hand(&self) -> bool {
+        !matches!(self.pass, Pass::Empty | Pass::Done)
+    }
+
+    /// The view of its image, once that has been published.
+    pub(super) fn view(&self) -> Option<&View> {
+        self.view.as_ref().filter(|_| self.pass == Pass::Done)
+    }
+
+    /// How far the first image has come.
+    pub(super) fn pass(&self) -> Pass {
+        self.pass
+    }
+
+    /// The size of its image in pixels.
+    pub(super) fn size(&self) -> Option<[u32; 2]> {
+        self.view.map(|view| [view.width, view.height])
+    }
+
+    /// Notes that its image is the one to be shown and refined from now on.
+    pub(super) fn publish(&mut self) {
+        self.enter(Pass::Done);
+    }
+
+    /// Whether the image is final, once its first one is complete.
+    pub(super) fn has_converged(&self, method: Method) -> bool {
+        !method.is_progressive()
+            || (self.refinement.is_finished()
+                && (!self.refines_first(method)
+                    || self.refine_first.is_up_to_date(&self.refinement)))
+    }
+
+    /// Whether everything is drawn once, after refinement.
+    pub(super) fn refines_first(&self, method: Method) -> bool {
+        method.is_progressive() && !self.backend.capabilities().refines_in_place()
+    }
+
+    /// Begins the first image of a view, or goes on with it if it is in hand. `frame` is the number of the frame. What is known
+    /// about the view already is not done again.
+    pub(super) fn begin(&mut self, view: View, divisor: u32, frame: u64) {
+        if self.view != Some(view) {
+            self.forget();
+            self.view = Some(view);
+            self.divisor = divisor;
+        }
+        self.taken_in.get_or_insert(frame);
+    }
+
+    /// How many frames before `frame` its camera and scene were the ones to be shown.
+    pub(super) fn age(&self, frame: u64) -> u64 {
+        frame.saturating_sub(self.taken_in.unwrap_or(frame))
+    }
+
+    /// Goes on with the first image until it lacks at most its colours: then true. False when time is up before.
+    pub(super) fn prepare(&mut self, studio: &mut Studio<'_>, allowance: &Allowance<'_>) -> bool {
+        let Some(view) = self.view else {
+            return false;
+        };
+        while self.pass < Pass::Colouring {
+            let (is_done, next) = match self.pass {
+                Pass::Empty => (self.cull(studio, allowance, &view), Pass::Rasterizing),
+                Pass::Rasterizing => (self.rasterize(studio, allowance, &view), Pass::Lighting),
+                _ => (self.illuminate(studio, allowance, &view), Pass::Colouring),
+            };
+            if is_done {
+                self.enter(next);
+            }
+            if !is_done || !allowance.goes_on() {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Gives the image its colours. False when time was up before, which is never if it is to be done `at_once`.
+    pub(super) fn colour(
+        &mut self,
+        studio: &mut Studio<'_>,
+        allowance: &Allowance<'_>,
+        at_once: bool,
+    ) -> bool {
+        let Some(view) = self.view.filter(|_| self.pass == Pass::Colouring) else {
+            return self.pass > Pass::Colouring;
+        };
+        let load = studio
+            .load
+            .resolve(studio.method, studio.world.lights.len(), &view);
+        let since = allowance.elapsed_ms();
+        // On a backend that cannot repaint, refinement comes first.
+        let is_done = if self.refines_first(studio.method) {
+            self.refine_first.begin();
+            true
+        } else {
+            let go_on = || at_once || allowance.goes_on();
+            let turn = self.turn(&go_on);
+            self.base.resolve(
+                studio.exec,
+                studio.method,
+                studio.world,
+                &view,
+                &mut *self.backend,
+                turn,
+            )
+        };
+        let ms = allowance.elapsed_ms() - since;
+        studio.stages.resolve += ms;
+        self.stage_ms += ms;
+        if !is_done {
+            return false;
+        }
+        studio.predicted.resolve += self.learn(studio.costs, Kind::Resolve, load);
+        self.begin_refinement(studio, allowance, &view);
+        self.enter(Pass::Coloured);
+        true
+    }
+
+    /// Refines the image while the budget lasts, less what handing it over will take. Returns the milliseconds that
+    /// drawing took, where that comes after refinement and was done.
+    pub(super) fn refine(
+        &mut self,
+        easel: &mut Easel<'_, '_>,
+        allowance: &mut Allowance<'_>,
+    ) -> Option<f64> {
+        let view = *self.view()?;
+        let refines_first = self.refines_first(easel.method);
+        let mut stage = Stage {
+            exec: easel.exec,
+            world: easel.world,
+            view: &view,
+            base: &self.base,
+            backend: &mut *self.backend,
+        };
+        let refinement = &mut self.refinement;
+        if refines_first {
+            let presenting_ms =
+                load::pending_ms(easel.costs, stage.backend, self.divisor, easel.target, true);
+            return self
+                .refine_first
+                .frame(refinement, &mut stage, allowance, presenting_ms);
+        }
+        let mut since = allowance.elapsed_ms();
+        while !allowance.is_satisfied_by(refinement.estimated_error()) {
+            let presenting_ms = load::pending_ms(
+                easel.costs,
+                stage.backend,
+                self.divisor,
+                easel.target,
+                false,
+            );
+            allowance.reserve_ms(presenting_ms);
+            let kind = refinement.next_kind();
+            let rate = |units| Load::of_items(units as f64);
+            allowance.set_ms_per_unit(easel.costs.predict_at_most_ms(kind, rate(1)));
+            let units = allowance.spent_units();
+            let is_done = refinement.step(&mut stage, allowance);
+            let load = rate(allowance.spent_units() - units);
+            easel.predicted.refine += easel.costs.predict_ms(kind, load);
+            easel
+                .costs
+                .learn(kind, load, allowance.elapsed_ms() - since);
+            if !is_done {
+                break;
+            }
+        }
+        None
+    }
+
+    fn begin_refinement(
+        &mut self,
+        studio: &mut Studio<'_>,
+        allowance: &Allowance<'_>,
+        view: &View,
+    ) {
+        if !studio.method.is_progressive() {
+            return self.refinement.clear();
+        }
+        let since = allowance.elapsed_ms();
+        let (exec, world, backend) = (studio.exec, studio.world, &*self.backend);
+        self.base.classify(exec, world, view, backend);
+        self.refinement
+            .collect_candidates(exec, studio.method, world, view, &self.base, backend);
+        studio.stages.classify += allowance.elapsed_ms() - since;
+    }
+
+    fn cull(&mut self, studio: &mut Studio<'_>, allowance: &Allowance<'_>, view: &View) -> bool {
+        let since = allowance.elapsed_ms();
+        self.base.cull(studio.culler, view);
+        let ms = allowance.elapsed_ms() - since;
+        studio.stages.cull += ms;
+        self.stage_ms = ms;
+        studio.predicted.cull += self.learn(studio.costs, Kind::Cull, studio.load.cull());
+        studio.load.triangles = self.base.triangles_handed_over() as f64;
+        true
+    }
+
+    fn rasterize(
+        &mut self,
+        studio: &mut Studio<'_>,
+        allowance: &Allowance<'_>,
+        view: &View,
+    ) -> bool {
+        let predicted = studio
+            .costs
+            .predict_ms(Kind::Raster, studio.load.raster(view));
+        let since = allowance.elapsed_ms();
+        let go_on = || allowance.goes_on();
+        let turn = self.turn(&go_on);
+        let is_done =
+            self.base
+                .rasterize(studio.exec, studio.world, view, &mut *self.backend, turn);
+        let ms = allowance.elapsed_ms() - since;
+        studio.stages.raster += ms;
+        self.stage_ms += ms;
+        if is_done {
+            studio.load.visible = self.base.visible_triangles() as f64;
+            let pixels = f64::from(view.width) * f64::from(view.height);
+            studio.load.coverage = self.base.covered_pixels() as f64 / pixels.max(1.0);
+            studio.predicted.raster += predicted;
+            self.learn(studio.costs, Kind::Raster, studio.load.raster(view));
+        }
+        is_done
+    }
+
+    /// Illuminates the vertices of triangles that own a pixel, and no others.
+    fn illuminate(
+        &mut self,
+        studio: &mut Studio<'_>,
+        allowance: &Allowance<'_>,
+        view: &View,
+    ) -> bool {
+        let load = studio.load.shade(studio.method, studio.world.lights.len());
+        let since = allowance.elapsed_ms();
+        let go_on = || allowance.goes_on();
+        let turn = self.turn(&go_on);
+        let is_done = self.base.shade(
+            studio.exec,
+            studio.method,
+            studio.world,
+            view,
+            &*self.backend,
+            turn,
+        );
+        let ms = allowance.elapsed_ms() - since;
+        studio.stages.shade += ms;
+        self.stage_ms += ms;
+        if is_done {
+            studio.predicted.shade += self.learn(studio.costs, Kind::Shade, load);
+        }
+        is_done
+    }
+
+    /// The next turn of the stage in hand.
+    fn turn<'a>(&mut self, go_on: GoOn<'a>) -> Turn<'a> {
+        Turn {
+            is_first: std::mem::replace(&mut self.is_fresh, false),
+            go_on,
+        }
+    }
+
+    /// Learns from the stage that has ended, and returns what it had been predicted to take.
+    fn learn(&self, costs: &mut CostModel, kind: Kind, load: Load) -> f64 {
+        let predicted = costs.predict_ms(kind, load);
+        costs.learn(kind, load, self.stage_ms);
+        predicted
+    }
+
+    fn enter(&mut self, pass: Pass) {
+        self.pass = pass;
+        self.is_fresh = true;
+        self.stage_ms = 0.0;
+    }
+}

@@ -1,0 +1,30 @@
+//! What time had to say about a frame.
+
+use serde::{Deserialize, Serialize};
+
+/// Everything about a frame that was decided by time. A frame of the same scene, after the same frames, is repeated bit for bit by
+/// [`Budget::Replay`](super::Budget::Replay), on any machine and any number of threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameRecord {
+    /// Divisor of the image's sides that a new first image was to be drawn at.
+    pub divisor: u32,
+    /// First images completed in the frame.
+    pub images: u32,
+    /// Whether a further one was begun.
+    pub is_image_begun: bool,
+    /// Steps of refinement that were admitted.
+    pub steps: u64,
+}
+
+impl Default for FrameRecord {
+    /// A frame in which nothing was done.
+    fn default() -> Self {
+        Self {
+            divisor: 1,
+            images: 0,
+            is_image_begun: false,
+            steps: 0,
+        }
+    }
+}
