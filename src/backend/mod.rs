@@ -168,7 +168,8 @@ pub enum Fill {
 /// [turns](Turn) of what `rasterize` and `resolve` do at once, with the same results, bit for bit. Later turns of the same
 /// work come with the same geometry and paint. Until it is complete, nothing else may be asked but what begins
 /// anew: `rasterize`, or the first turn of `rasterize_while`, at any time; `resolve`, or the first turn of `resolve_while`, when
-/// the image has been rasterized.
+/// the image has been rasterized. Only [`present`](Self::present), and what tells what it would do, may be called at any time: until an
+/// image of the same size gets its first colours, the image before it is handed over.
 ///
 /// **What may be assumed.** Indices are in range, `visible` is ascending and disjoint, and the view's sides are at most
 /// [`MAX_IMAGE_SIDE`](crate::geometry::screen::MAX_IMAGE_SIDE). The world's triangles and positions do not change

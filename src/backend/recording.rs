@@ -20,7 +20,7 @@
 //! ```
 
 use super::{Backend, BasePaint, Capabilities, Geometry, Patch, RasterCounts, RefinedPart};
-use crate::output::Target;
+use crate::output::{Rect, Target};
 use crate::parallel::{Exec, Turn};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -192,6 +192,10 @@ impl Backend for RecordingBackend {
     }
 
     /// Writes to the same log.
+    fn changes(&self, target: &Target<'_>, out: &mut Vec<Rect>) {
+        self.inner.changes(target, out);
+    }
+
     fn sibling(&self) -> Option<Box<dyn Backend>> {
         Some(Box::new(Self {
             inner: self.inner.sibling()?,

@@ -45,7 +45,7 @@ pub use tile::NO_TRIANGLE;
 use super::{
     Backend, BasePaint, Capabilities, Geometry, Interpolation, Patch, RasterCounts, new_writer,
 };
-use crate::output::{Stamp, Target};
+use crate::output::{Rect, Stamp, Target};
 use crate::parallel::{Exec, Turn, Watch};
 use drawing::{Drawing, Spare};
 use repaint::Job;
@@ -246,6 +246,13 @@ impl Backend for SoftwareBackend {
         present::stale_tiles(&self.tiles, known)
             .map(Tile::pixels)
             .sum()
+    }
+
+    fn changes(&self, target: &Target<'_>, out: &mut Vec<Rect>) {
+        if (target.width(), target.height()) == (self.grid.width, self.grid.height) {
+            let known = target.serial_by(self.writer);
+            present::changes(self.grid, &self.tiles, known, out);
+        }
     }
 
     fn present(&mut self, exec: Exec, target: &mut Target<'_>) -> u64 {

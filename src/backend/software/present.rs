@@ -5,7 +5,7 @@
 
 use super::tile::{BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, Grid, TILE_SIDE, Tile};
 use crate::output::target::PIXEL_BYTES;
-use crate::output::{ChannelOrder, Stamp, Target};
+use crate::output::{ChannelOrder, Rect, Stamp, Target};
 use crate::parallel::Exec;
 
 /// Bytes of a row of a block.
@@ -53,6 +53,35 @@ pub(super) fn stale_tiles(tiles: &[Tile], known: Option<u64>) -> impl Iterator<I
     tiles
         .iter()
         .filter(move |tile| known.is_none_or(|serial| tile.serial > serial))
+}
+
+/// Appends the rectangles that such a target lacks: neighbours in a row of tiles are one, and so are equal ones in rows that
+/// follow each other.
+pub(super) fn changes(grid: Grid, tiles: &[Tile], known: Option<u64>, out: &mut Vec<Rect>) {
+    let is_stale = |tile: &Tile| known.is_none_or(|serial| tile.serial > serial);
+    let first = out.len();
+    for row in tiles.chunks(grid.columns.max(1)) {
+        // No look further back: it is no harm if some that could be one are two.
+        let recent = out.len().saturating_sub(2 * row.len()).max(first);
+        for run in row.chunk_by(|a, b| is_stale(a) == is_stale(b)) {
+            if !is_stale(&run[0]) {
+                continue;
+            }
+            let rect = Rect {
+                x: run[0].origin[0] as u32,
+                y: run[0].origin[1] as u32,
+                width: run.iter().map(|tile| tile.width as u32).sum(),
+                height: run[0].height as u32,
+            };
+            let below = |above: &&mut Rect| {
+                (above.x, above.width, above.y + above.height) == (rect.x, rect.width, rect.y)
+            };
+            match out[recent..].iter_mut().find(below) {
+                Some(above) => above.height += rect.height,
+                None => out.push(rect),
+            }
+        }
+    }
 }
 
 /// Copies a tile into the rows of the target that it takes part in.

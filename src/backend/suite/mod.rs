@@ -61,6 +61,7 @@ pub fn check(make: impl Fn() -> Box<dyn Backend>) {
     }
 
     presenting::only_what_is_missing_is_written(&fixture);
+    presenting::the_image_before_stays_until_the_next_is_coloured(&fixture);
     presenting::targets_of_any_layout_are_filled(&fixture);
     presenting::a_target_of_another_size_is_left_alone(&fixture);
 

@@ -3,7 +3,8 @@
 use super::fixture::{Fixture, Picture, Random, draw};
 use crate::backend::{Backend, BasePaint};
 use crate::geometry::Vec3s;
-use crate::output::{ChannelOrder, Frame, Target};
+use crate::output::{ChannelOrder, Frame, Rect, Target};
+use crate::parallel::Turn;
 
 const SIZE: (u32, u32) = (301, 83);
 const PIXELS: u64 = 301 * 83;
@@ -17,6 +18,9 @@ fn picture() -> (Picture, Vec3s) {
 /// Presents, after asking how much that will be.
 fn present(backend: &mut dyn Backend, fixture: &Fixture<'_>, target: &mut Target<'_>) -> u64 {
     let pending = backend.pending_pixels(target);
+    let mut changes = Vec::new();
+    backend.changes(target, &mut changes);
+    check_changes(&changes, pending, target);
     let written = backend.present(fixture.exec, target);
     assert_eq!(written, pending, "pixels written against pending ones");
     assert_eq!(
@@ -25,6 +29,59 @@ fn present(backend: &mut dyn Backend, fixture: &Fixture<'_>, target: &mut Target
         "nothing is pending after presenting"
     );
     written
+}
+
+/// Rectangles are as many pixels as will be written, inside of the target, and apart from each other.
+fn check_changes(changes: &[Rect], pending: u64, target: &Target<'_>) {
+    let pixels: u64 = changes
+        .iter()
+        .map(|rect| u64::from(rect.width) * u64::from(rect.height))
+        .sum();
+    assert_eq!(pixels, pending, "pixels of the changes {changes:?}");
+    for (index, a) in changes.iter().enumerate() {
+        assert!(a.width > 0 && a.height > 0, "{a:?} is empty");
+        assert!(
+            a.x + a.width <= target.width() && a.y + a.height <= target.height(),
+            "{a:?} is not inside of the target"
+        );
+        for b in &changes[..index] {
+            let is_apart = a.x + a.width <= b.x
+                || b.x + b.width <= a.x
+                || a.y + a.height <= b.y
+                || b.y + b.height <= a.y;
+            assert!(is_apart, "{a:?} overlaps {b:?}");
+        }
+    }
+}
+
+/// While another image of the same size is being rasterized, and when it has been, the image before it is handed over.
+pub(super) fn the_image_before_stays_until_the_next_is_coloured(fixture: &Fixture<'_>) {
+    let (picture, colours) = picture();
+    let mut backend = fixture.backend();
+    let paint = BasePaint::Gouraud(&colours);
+    let want = draw(&mut *backend, fixture.exec, &picture, paint);
+    let mut other = Picture::flat(SIZE.0, SIZE.1);
+    other.add_facing([[5.0, 70.0, 0.4], [280.0, 1.0, 0.4], [300.0, 80.0, 0.4]]);
+    let geometry = other.geometry();
+    let mut turn = Turn::first(&|| false);
+    loop {
+        let is_done = backend
+            .rasterize_while(fixture.exec, geometry, turn)
+            .is_some();
+        let mut frame = Frame::new(SIZE.0, SIZE.1);
+        let written = frame.write(|target| present(&mut *backend, fixture, target));
+        assert_eq!(written, PIXELS, "a new frame is written in full");
+        assert!(frame.pixels() == want.pixels(), "the image before");
+        if is_done {
+            break;
+        }
+        turn = Turn::next(&|| false);
+    }
+    backend.resolve(fixture.exec, geometry, paint);
+    let want = fixture.image(&other, paint);
+    let mut frame = Frame::new(SIZE.0, SIZE.1);
+    frame.write(|target| present(&mut *backend, fixture, target));
+    assert!(frame.pixels() == want.pixels(), "the next image");
 }
 
 pub(super) fn only_what_is_missing_is_written(fixture: &Fixture<'_>) {
