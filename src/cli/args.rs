@@ -46,15 +46,19 @@ impl Machine {
         method: Method,
         encoding: Encoding,
     ) -> Result<Engine, EngineError> {
-        let options = EngineOptions {
+        Engine::with_options(scene, self.options(method, encoding))
+    }
+
+    /// Options of an engine that uses the machine so.
+    pub(super) fn options(&self, method: Method, encoding: Encoding) -> EngineOptions {
+        EngineOptions {
             method,
             backend: self.backend,
             encoding,
             threads: self.threads,
             simd: self.simd,
             ..EngineOptions::default()
-        };
-        Engine::with_options(scene, options)
+        }
     }
 
     /// The number of threads that will be used.
@@ -77,7 +81,7 @@ pub(super) struct Size {
     pub(super) height: u32,
 }
 
-fn size(text: &str) -> Result<Size, String> {
+pub(super) fn size(text: &str) -> Result<Size, String> {
     let (width, height) = text
         .split_once(['x', 'X'])
         .and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)))
@@ -105,6 +109,11 @@ pub(super) fn budget(ms: Option<f64>, units: Option<u64>) -> Budget {
 
 pub(super) fn milliseconds(text: &str) -> Result<f64, String> {
     not_negative(text).ok_or_else(|| "a budget is a number of milliseconds, 0 or more".to_owned())
+}
+
+/// An error in codes.
+pub(super) fn rmse(text: &str) -> Result<f64, String> {
+    not_negative(text).ok_or_else(|| "an error is a number of 8-bit codes, 0 or more".to_owned())
 }
 
 /// A finite number, 0 or more.

@@ -9,6 +9,7 @@ mod bench;
 mod command;
 mod console;
 mod inspect;
+mod log;
 mod machine;
 mod render;
 mod report;

@@ -1,7 +1,7 @@
 //! What is said of a frame, on the screen and to other programs.
 
 use serde_json::{Map, Value, json};
-use specula::frame::FrameStats;
+use specula::frame::{FrameStats, Outcome};
 use specula::measure::ErrorReport;
 use specula::schedule::Budget;
 
@@ -30,6 +30,10 @@ pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
         Budget::Work(units) => (None, Some(units)),
         Budget::Error(_) | Budget::Unlimited | Budget::Replay(_) => (None, None),
     };
+    let age = match stats.outcome {
+        Outcome::Stale { age } => age,
+        _ => Some(0),
+    };
     let stages: Map<String, Value> = (stats.stage_ms.entries())
         .into_iter()
         .map(|(name, ms)| (name.to_owned(), json!(ms)))
@@ -47,6 +51,8 @@ pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
         "budget_work": budget_work,
         "overshoot_ms": stats.overshoot_ms(),
         "outcome": stats.outcome.name(),
+        "age": age,
+        "divisor": stats.divisor,
         "converged": stats.converged,
         "estimated_error": stats.estimated_error,
         "triangles": stats.triangles,
@@ -135,7 +141,7 @@ impl FrameReport {
         format!(
             "frame {}: {} in {:.2} ms{budget}{converged}",
             self.number,
-            stats.outcome.name().replace('_', " "),
+            outcome(stats),
             stats.frame_ms
         )
     }
@@ -155,6 +161,19 @@ impl FrameReport {
         } else {
             text
         }
+    }
+}
+
+/// How far a frame came, in words.
+fn outcome(stats: &FrameStats) -> String {
+    match (stats.outcome, stats.divisor) {
+        (Outcome::Stale { age: None }, _) => "no image yet".to_owned(),
+        (Outcome::Stale { age: Some(age) }, _) => {
+            let frames = if age == 1 { "frame" } else { "frames" };
+            format!("stale by {age} {frames}")
+        }
+        (Outcome::Reduced, divisor) => format!("reduced to 1/{divisor}"),
+        (outcome, _) => outcome.name().replace('_', " "),
     }
 }
 

@@ -295,9 +295,9 @@ impl Picture {
             let is_done = refinement.step(&mut stage, allowance);
             let load = rate(allowance.spent_units() - units);
             easel.predicted.refine += easel.costs.predict_ms(kind, load);
-            easel
-                .costs
-                .learn(kind, load, allowance.elapsed_ms() - since);
+            let now = allowance.elapsed_ms();
+            easel.costs.learn(kind, load, now - since);
+            since = now;
             if !is_done {
                 break;
             }
