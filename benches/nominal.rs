@@ -209,7 +209,6 @@ impl Bench {
     fn signs(&self) -> f64 {
         let vertices: Vec<u32> = (0..self.world.positions.len() as u32).collect();
         let mut signs = SignBits::default();
-        signs.resize(&self.world);
         let ns = self.median_ns(|| {
             compute_signs(
                 self.exec.level,

@@ -105,7 +105,9 @@ impl Renderer {
         }
         let presenting_since = allowance.elapsed_ms();
         let drawing = drawing_ms.unwrap_or(0.0);
-        stages.refine += presenting_since - refining_since - drawing;
+        let collecting = self.refinement.take_collecting_ms();
+        stages.classify += collecting;
+        stages.refine += presenting_since - refining_since - drawing - collecting;
         stages.resolve += drawing;
 
         let pixels_written = self.backend.present(exec, target);
@@ -222,7 +224,7 @@ impl Renderer {
         self.is_lit = false;
     }
 
-    /// Gives the first image of a view its colours, and makes the list of what could be refined.
+    /// Gives the first image of a view its colours, and begins its refinement.
     fn light(
         &mut self,
         exec: Exec,
@@ -253,17 +255,10 @@ impl Renderer {
         }
         lap(&mut stages.resolve);
 
-        // Which triangles can hold a highlight, and what is worth refining?
+        // Which triangles can hold a highlight, and what is worth refining, is found out piece by piece.
         if self.method.is_progressive() {
-            self.base.classify(exec, &self.world, view, backend);
-            self.refinement.collect_candidates(
-                exec,
-                self.method,
-                &self.world,
-                view,
-                &self.base,
-                backend,
-            );
+            self.refinement
+                .begin(exec, self.method, &self.world, view, &self.base, backend);
         } else {
             self.refinement.clear();
         }

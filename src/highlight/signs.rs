@@ -27,10 +27,9 @@ use fearless_simd::prelude::*;
 /// Lights whose bits share a word.
 const WORD_LIGHTS: usize = 32;
 
-/// The sign bits of a scene's vertices, one word per 32 lights and plane.
+/// The sign bits of some vertices, by their places in the list they were computed for.
 #[derive(Clone, Debug, Default)]
 pub struct SignBits {
-    vertices: usize,
     /// One plane of bits after the other for each word of lights.
     words: Vec<[Vec<u32>; 3]>,
 }
@@ -41,47 +40,65 @@ const H2: usize = 1;
 const BACK: usize = 2;
 
 impl SignBits {
-    /// Makes room for a world; bits are undefined until computed. Allocates only when the world has grown.
-    pub fn resize(&mut self, world: &World) {
-        self.vertices = world.positions.len();
-        let lights = world.lights.len().min(MAX_LIGHTS);
-        self.words
-            .resize_with(lights.div_ceil(WORD_LIGHTS), Default::default);
+    /// Makes room for `vertices` vertices under `lights` lights. Allocates only when there were never so many.
+    fn resize(&mut self, vertices: usize, lights: usize) {
+        let words = lights.min(MAX_LIGHTS).div_ceil(WORD_LIGHTS);
+        self.words.resize_with(words, Default::default);
         for plane in self.words.iter_mut().flatten() {
-            plane.resize(self.vertices, 0);
+            // The last vector is stored whole.
+            plane.resize(vertices.next_multiple_of(MAX_LANES), 0);
         }
     }
 
-    /// Lights for which both tests differ among the three vertices: the triangle is a potentially highlighted one.
+    /// Lights for which both tests differ among three vertices, given by their places in the list: the triangle is a
+    /// potentially highlighted one.
     ///
     /// # Panics
-    /// When a vertex is not one of the world's.
+    /// When there is no such place.
+    #[inline]
     #[must_use]
-    pub fn pht_lights(&self, triangle: [u32; 3]) -> LightMask {
+    pub fn pht_lights(&self, places: [usize; 3]) -> LightMask {
         let mut mask = 0;
         for (index, planes) in self.words.iter().enumerate() {
-            let [h1, h2, back] = [H1, H2, BACK].map(|plane| {
-                let [a, b, c] = triangle.map(|vertex| planes[plane][vertex as usize]);
-                (a & b & c, a | b | c)
-            });
-            let passes = (h1.1 & !h1.0) & (h2.1 & !h2.0) & !back.0;
-            mask |= u128::from(passes) << (index * WORD_LIGHTS);
+            mask |= u128::from(passes(planes, places)) << (index * WORD_LIGHTS);
         }
         LightMask(mask)
     }
+
+    /// Whether there is any such light.
+    ///
+    /// # Panics
+    /// When there is no such place.
+    #[inline]
+    #[must_use]
+    pub fn is_pht(&self, places: [usize; 3]) -> bool {
+        self.words.iter().any(|planes| passes(planes, places) != 0)
+    }
 }
 
-/// Computes the bits of vertices given by index.
+/// For which lights of a word both tests differ among three vertices.
+#[inline]
+fn passes(planes: &[Vec<u32>; 3], places: [usize; 3]) -> u32 {
+    let [h1, h2, back] = [H1, H2, BACK].map(|plane| {
+        let [a, b, c] = places.map(|place| planes[plane][place]);
+        (a & b & c, a | b | c)
+    });
+    (h1.1 & !h1.0) & (h2.1 & !h2.0) & !back.0
+}
+
+/// Computes the bits of vertices given by index: `bits` then holds those of the vertices in this list, in its order.
 ///
 /// # Panics
-/// When a vertex is not one of the world's, or `bits` was not [resized](SignBits::resize) for it.
+/// When a vertex is not one of the world's.
 pub fn compute_signs(level: Level, world: &World, eye: Eye, vertices: &[u32], bits: &mut SignBits) {
+    bits.resize(vertices.len(), world.lights.len());
     dispatch!(level, simd => signs_of_list(simd, world, eye, vertices, bits));
 }
 
 #[inline(always)]
 fn signs_of_list<S: Simd>(simd: S, world: &World, eye: Eye, vertices: &[u32], bits: &mut SignBits) {
-    for group in vertices.chunks(S::f32s::LEN) {
+    let lanes = S::f32s::LEN;
+    for (group, first) in vertices.chunks(lanes).zip((0..).step_by(lanes)) {
         let mut places = [group[0] as usize; MAX_LANES];
         for (place, &vertex) in places.iter_mut().zip(group) {
             *place = vertex as usize;
@@ -95,11 +112,7 @@ fn signs_of_list<S: Simd>(simd: S, world: &World, eye: Eye, vertices: &[u32], bi
         for (planes, lights) in bits.words.iter_mut().zip(world.lights.chunks(WORD_LIGHTS)) {
             let words = signs_of_lights(simd, lights, point, normal, to_viewer);
             for (plane, word) in planes.iter_mut().zip(words) {
-                let mut values = [0; MAX_LANES];
-                word.store_slice(&mut values[..S::u32s::LEN]);
-                for (&vertex, &value) in group.iter().zip(&values) {
-                    plane[vertex as usize] = value;
-                }
+                word.store_slice(&mut plane[first..first + lanes]);
             }
         }
     }
@@ -232,7 +245,6 @@ mod tests {
             ] {
                 for level in SimdLevel::available() {
                     let mut bits = SignBits::default();
-                    bits.resize(&world);
                     compute_signs(
                         level.token().expect("available"),
                         &world,
@@ -240,13 +252,13 @@ mod tests {
                         &list,
                         &mut bits,
                     );
-                    for &v in &list {
+                    for (place, &v) in list.iter().enumerate() {
                         for (index, light) in world.lights.iter().enumerate() {
                             let point = vector(world.positions.get(v as usize));
                             let normal = vector(world.normals.get(v as usize));
                             let (values, back) = by_angles(point, normal, &eye, light);
                             let bit = |plane: usize| {
-                                bits.words[index / 32][plane][v as usize] >> (index % 32) & 1 == 1
+                                bits.words[index / 32][plane][place] >> (index % 32) & 1 == 1
                             };
                             for plane in [H1, H2] {
                                 if values[plane].abs() > 1e-5 {
@@ -287,7 +299,6 @@ mod tests {
         };
         let mut bits = SignBits::default();
         let level = SimdLevel::detect().token().expect("detected");
-        bits.resize(&world);
         compute_signs(
             level,
             &world,

@@ -71,6 +71,16 @@ impl<'a> Allowance<'a> {
         !self.is_over
     }
 
+    /// Admits work of about `nominal_ns` nanoseconds that costs no work units and is no [step](Self::steps), or ends the
+    /// frame's refinement like [`admit`](Self::admit): only a wall-clock budget can refuse it.
+    #[must_use]
+    pub fn admit_free(&mut self, nominal_ns: u64) -> bool {
+        if let Budget::Millis(_) = self.budget {
+            self.is_over = self.is_over || !self.has_room_for(nominal_ns);
+        }
+        !self.is_over
+    }
+
     fn has_room_for(&self, units: u64) -> bool {
         match self.budget {
             Budget::Unlimited => true,
@@ -146,6 +156,19 @@ mod tests {
         assert!(!allowance.admit(101));
         assert!(!allowance.admit(1));
         assert_eq!(allowance.steps(), 0);
+    }
+
+    #[test]
+    fn what_is_free_is_refused_by_the_clock_only() {
+        let clock = ManualClock::default();
+        let mut allowance = Allowance::new(Budget::Work(0), &clock, 0.0);
+        assert!(allowance.admit_free(1_000_000));
+        allowance = Allowance::new(Budget::from_millis(1.0), &clock, 0.0);
+        assert!(allowance.admit_free(1_000_000));
+        assert_eq!((allowance.steps(), allowance.spent_units()), (0, 0));
+        clock.advance_ms(0.5);
+        assert!(!allowance.admit_free(500_001));
+        assert!(!allowance.admit(0), "the first refusal is the last word");
     }
 
     #[test]

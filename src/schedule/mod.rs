@@ -10,9 +10,13 @@
 
 mod budget;
 pub mod cost;
+mod list;
 mod queue;
+mod rank;
 mod rate;
 
 pub use budget::{Allowance, Budget};
+pub use list::RankedList;
 pub use queue::RankedQueue;
+pub use rank::Rank;
 pub use rate::LearnedRate;

@@ -1,0 +1,290 @@
+//! Collecting pieces: every visible triangle of a new image becomes a root and a candidate.
+//!
+//! For each triangle that means the paper's sign tests at its corners, a first guess of its error from its colours and, if it is
+//! not tiny, from one true colour at its centroid, and a rank. None of it depends on other triangles, so the pieces may be of any size and are
+//! shared among threads. They come before all planning, so that the best candidates come first; they are
+//! booked by the clock only, for without them nothing is known about the image.
+//!
+//! Triangles are taken in blocks of [`BLOCK`]. Inside a block what is needed of a vertex is worked out once, as a rule:
+//! where two vertices share a place in a small table, some of it is done again, to the same result.
+
+use super::painting::piece_limit;
+use super::ranking::{self, RootRanking};
+use super::{PIECE_UNITS, Refinement, Root, Stage, drawn_once};
+use crate::geometry::Vec3s;
+use crate::highlight::{self, SignBits};
+use crate::parallel::Exec;
+use crate::refine::estimate::Samples;
+use crate::scene::{View, World};
+use crate::schedule::{Allowance, Rank, cost};
+
+/// Triangles of a block. Pieces consist of whole blocks, so that sums over blocks do not depend on the pieces.
+const BLOCK: usize = 512;
+
+/// Shares of a piece per thread: a thread that comes late leaves some of its own to others.
+const SHARES_PER_THREAD: usize = 4;
+
+/// A triangle of fewer pixels is ranked by its corners alone: a sample would cost as much as shading some of them.
+const PIXELS_FOR_CENTROID: u32 = 8;
+
+/// Entries of the table that finds vertices of a block again, a power of two.
+const TABLE: usize = 2048;
+
+/// What blocks are collected from.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    exec: Exec,
+    world: &'a World,
+    view: &'a View,
+    /// Linear colours of the vertices.
+    colours: &'a Vec3s,
+    ranking: RootRanking<'a>,
+    /// Triangles of fewer pixels are no candidates.
+    least_pixels: u32,
+}
+
+/// What a block has come to.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    /// Expected sum of squared errors, as in [`Refinement::error_mass`].
+    error_mass: f64,
+    pixels: u64,
+    phts: u64,
+    /// Triangles whose material has no specular term.
+    matte: u64,
+}
+
+/// Workspace of a share of a piece.
+#[derive(Debug)]
+pub(super) struct Collector {
+    /// Vertices of the block's triangles.
+    vertices: Vec<u32>,
+    /// The place in `vertices` of the last vertex with each remainder; of an older block where it does not hold it.
+    table: Box<[u16; TABLE]>,
+    /// Places in `vertices` of the triangles' corners.
+    corners: Vec<[u16; 3]>,
+    /// What [`ranking::lightness`] says, by place.
+    lightness: Vec<f32>,
+    signs: SignBits,
+    samples: Samples,
+    /// One for each block of the share.
+    tallies: Vec<Tally>,
+}
+
+impl Collector {
+    fn new() -> Self {
+        let mut samples = Samples::default();
+        samples.reserve(BLOCK);
+        Self {
+            vertices: Vec::with_capacity(3 * BLOCK),
+            table: Box::new([0; TABLE]),
+            corners: Vec::with_capacity(BLOCK),
+            lightness: Vec::with_capacity(3 * BLOCK),
+            signs: SignBits::default(),
+            samples,
+            tallies: Vec::new(),
+        }
+    }
+
+    /// Collects the triangles of a share, of which the ids and pixels are known.
+    fn collect(&mut self, source: &Source<'_>, roots: &mut [Root], ranks: &mut [Rank]) {
+        self.tallies.clear();
+        for (roots, ranks) in roots.chunks_mut(BLOCK).zip(ranks.chunks_mut(BLOCK)) {
+            let tally = self.collect_block(source, roots, ranks);
+            self.tallies.push(tally);
+        }
+    }
+
+    fn collect_block(
+        &mut self,
+        source: &Source<'_>,
+        roots: &mut [Root],
+        ranks: &mut [Rank],
+    ) -> Tally {
+        self.list_vertices(source.world, roots);
+        let mut tally = Tally::default();
+        self.guess_from_corners(source, roots, &mut tally);
+        if !source.ranking.by_area {
+            self.sample_centroids(source, roots);
+        }
+        for (root, rank) in roots.iter().zip(ranks) {
+            tally.pixels += u64::from(root.pixels);
+            tally.error_mass += root.mass();
+            if root.pixels >= source.least_pixels {
+                *rank = Rank::new(source.ranking.choose(root).0);
+            }
+        }
+        tally
+    }
+
+    /// Lists the vertices of some triangles, and which of them are their corners.
+    fn list_vertices(&mut self, world: &World, roots: &[Root]) {
+        self.vertices.clear();
+        self.corners.clear();
+        for root in roots {
+            self.corners
+                .push(world.triangles[root.triangle as usize].map(|vertex| {
+                    let known = &mut self.table[vertex as usize % TABLE];
+                    if self.vertices.get(usize::from(*known)) != Some(&vertex) {
+                        *known = self.vertices.len() as u16;
+                        self.vertices.push(vertex);
+                    }
+                    *known
+                }));
+        }
+    }
+
+    /// Tests for highlights, and guesses errors, by what is known at the corners.
+    fn guess_from_corners(&mut self, source: &Source<'_>, roots: &mut [Root], tally: &mut Tally) {
+        let Source { world, view, .. } = *source;
+        self.lightness.clear();
+        self.lightness.extend(
+            self.vertices
+                .iter()
+                .map(|&v| ranking::lightness(view.encoding, source.colours.get(v as usize))),
+        );
+        let is_specular = |triangle: u32| {
+            let material = world.triangle_material[triangle as usize];
+            world.materials[usize::from(material)].is_specular()
+        };
+        let is_any_specular = roots.iter().any(|root| is_specular(root.triangle));
+        if is_any_specular {
+            let signs = &mut self.signs;
+            highlight::compute_signs(source.exec.level, world, view.eye, &self.vertices, signs);
+        }
+        for (root, &corners) in roots.iter_mut().zip(&self.corners) {
+            let corners = corners.map(usize::from);
+            let is_specular = is_specular(root.triangle);
+            root.is_pht = is_specular && self.signs.is_pht(corners);
+            root.prior =
+                ranking::prior_error(corners.map(|place| self.lightness[place]), root.is_pht);
+            tally.matte += u64::from(!is_specular);
+            tally.phts += u64::from(root.is_pht);
+        }
+    }
+
+    /// Adds to the prior error of triangles what one true colour, at their centroids, has to say.
+    fn sample_centroids(&mut self, source: &Source<'_>, roots: &mut [Root]) {
+        let Source { world, view, .. } = *source;
+        let is_sampled = |root: &&mut Root| root.pixels >= PIXELS_FOR_CENTROID;
+        self.samples.clear();
+        for root in roots.iter_mut().filter(is_sampled) {
+            let corners = world.triangles[root.triangle as usize].map(|v| v as usize);
+            self.samples.push(
+                mean(corners.map(|v| world.positions.get(v))),
+                mean(corners.map(|v| world.normals.get(v))),
+                world.triangle_material[root.triangle as usize],
+                mean(corners.map(|v| source.colours.get(v))),
+            );
+        }
+        let exec = source.exec.on_one_thread();
+        self.samples.illuminate(exec, world, view);
+        for (sample, root) in roots.iter_mut().filter(is_sampled).enumerate() {
+            let [r, g, b] = self.samples.deviation(sample);
+            root.prior += ranking::CENTROID_SHARE * (r * r + g * g + b * b) / 3.0;
+        }
+    }
+}
+
+/// The mean of a triangle's corners.
+fn mean(v: [[f32; 3]; 3]) -> [f32; 3] {
+    std::array::from_fn(|k| (v[0][k] + v[1][k] + v[2][k]) / 3.0)
+}
+
+impl Refinement {
+    /// Whether visible triangles are left that are not candidates yet.
+    pub(super) fn is_collecting(&self) -> bool {
+        self.roots.len() < self.visible
+    }
+
+    /// Makes the next visible triangles candidates. False when the budget does not admit it.
+    pub(super) fn collect_piece(
+        &mut self,
+        stage: &Stage<'_>,
+        allowance: &mut Allowance<'_>,
+    ) -> bool {
+        let limit = piece_limit(stage, allowance).min(allowance.units_left().max(PIECE_UNITS));
+        if !allowance.admit_free(limit) {
+            return false;
+        }
+        let since = allowance.elapsed_ms();
+        let first = self.roots.len();
+        self.take_up(stage, limit as f32);
+        self.collect_from(stage, first);
+        self.collecting_ms += allowance.elapsed_ms() - since;
+        true
+    }
+
+    /// Makes the next visible triangles roots of which only ids and pixels are known, block by block until collecting them will take
+    /// so many nominal nanoseconds.
+    fn take_up(&mut self, stage: &Stage<'_>, limit: f32) {
+        let lights = stage.world.lights.len();
+        let (each, sample) = (cost::collecting(1.0, lights), cost::samples(1, lights));
+        let visible = stage.backend.visible_triangles();
+        let left = visible.get(self.roots.len()..).unwrap_or_default();
+        let mut units = 0.0;
+        for block in left.chunks(BLOCK) {
+            for &triangle in block {
+                let pixels = stage.backend.visible_pixels(triangle);
+                let is_sampled = pixels >= PIXELS_FOR_CENTROID && !self.by_area;
+                units += each + if is_sampled { sample } else { 0.0 };
+                self.places.push(triangle);
+                self.roots.push(Root::new(triangle, pixels));
+            }
+            if units >= limit {
+                break;
+            }
+        }
+    }
+
+    /// Collects the roots from `first` on.
+    fn collect_from(&mut self, stage: &Stage<'_>, first: usize) {
+        let roots = &mut self.roots[first..];
+        let ranks = self.ranked_roots.extend(roots.len());
+        let shares = match stage.exec.threads {
+            1 => 1,
+            threads => threads * SHARES_PER_THREAD,
+        };
+        let share = roots.len().div_ceil(BLOCK).div_ceil(shares) * BLOCK;
+        if self.collectors.len() < shares {
+            self.collectors.resize_with(shares, Collector::new);
+        }
+        let source = Source {
+            exec: stage.exec,
+            world: stage.world,
+            view: stage.view,
+            colours: stage.base.colours(),
+            ranking: RootRanking {
+                forest: &self.forest,
+                lights: stage.world.lights.len(),
+                by_area: self.by_area,
+                is_drawn_once: self.is_drawn_once,
+            },
+            least_pixels: if self.is_drawn_once {
+                drawn_once::LEAST_PIXELS
+            } else {
+                0
+            },
+        };
+        let collectors = &mut self.collectors[..shares];
+        let exec = stage.exec;
+        exec.for_each_chunk_with(
+            collectors,
+            roots,
+            ranks,
+            share.max(1),
+            |own, roots, ranks| {
+                own.collect(&source, roots, ranks);
+            },
+        );
+        let used = roots.len().div_ceil(share.max(1));
+        let tallies = self.collectors[..used].iter().flat_map(|own| &own.tallies);
+        for tally in tallies {
+            self.pixels += tally.pixels;
+            self.error_mass += tally.error_mass;
+            self.counters.phts += tally.phts;
+            self.counters.matte += tally.matte;
+        }
+        self.ranked_roots.admit(first);
+    }
+}
