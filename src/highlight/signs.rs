@@ -24,29 +24,32 @@ use crate::scene::{Eye, ShadingLight, World};
 use crate::simd::{Level, Simd, dispatch};
 use fearless_simd::prelude::*;
 
-/// Lights whose bits share a word.
-const WORD_LIGHTS: usize = 32;
+/// Lights whose bits share a word: as many as there is room for with three bits each.
+const WORD_LIGHTS: usize = 10;
+
+/// Where in a word each test's bits begin, light by light.
+const H1: usize = 0;
+const H2: usize = WORD_LIGHTS;
+const BACK: usize = 2 * WORD_LIGHTS;
+
+/// The bits of one test.
+const ONE_TEST: u32 = (1 << WORD_LIGHTS) - 1;
 
 /// The sign bits of some vertices, by their places in the list they were computed for.
 #[derive(Clone, Debug, Default)]
 pub struct SignBits {
-    /// One plane of bits after the other for each word of lights.
-    words: Vec<[Vec<u32>; 3]>,
+    /// For each [`WORD_LIGHTS`] lights, a word for each vertex.
+    words: Vec<Vec<u32>>,
 }
-
-/// Where in [`SignBits::words`] each test's bits are.
-const H1: usize = 0;
-const H2: usize = 1;
-const BACK: usize = 2;
 
 impl SignBits {
     /// Makes room for `vertices` vertices under `lights` lights. Allocates only when there were never so many.
     fn resize(&mut self, vertices: usize, lights: usize) {
         let words = lights.min(MAX_LIGHTS).div_ceil(WORD_LIGHTS);
         self.words.resize_with(words, Default::default);
-        for plane in self.words.iter_mut().flatten() {
+        for words in &mut self.words {
             // The last vector is stored whole.
-            plane.resize(vertices.next_multiple_of(MAX_LANES), 0);
+            words.resize(vertices.next_multiple_of(MAX_LANES), 0);
         }
     }
 
@@ -59,8 +62,8 @@ impl SignBits {
     #[must_use]
     pub fn pht_lights(&self, places: [usize; 3]) -> LightMask {
         let mut mask = 0;
-        for (index, planes) in self.words.iter().enumerate() {
-            mask |= u128::from(passes(planes, places)) << (index * WORD_LIGHTS);
+        for (index, words) in self.words.iter().enumerate() {
+            mask |= u128::from(passes(words, places)) << (index * WORD_LIGHTS);
         }
         LightMask(mask)
     }
@@ -72,18 +75,17 @@ impl SignBits {
     #[inline]
     #[must_use]
     pub fn is_pht(&self, places: [usize; 3]) -> bool {
-        self.words.iter().any(|planes| passes(planes, places) != 0)
+        self.words.iter().any(|words| passes(words, places) != 0)
     }
 }
 
 /// For which lights of a word both tests differ among three vertices.
 #[inline]
-fn passes(planes: &[Vec<u32>; 3], places: [usize; 3]) -> u32 {
-    let [h1, h2, back] = [H1, H2, BACK].map(|plane| {
-        let [a, b, c] = places.map(|place| planes[plane][place]);
-        (a & b & c, a | b | c)
-    });
-    (h1.1 & !h1.0) & (h2.1 & !h2.0) & !back.0
+fn passes(words: &[u32], places: [usize; 3]) -> u32 {
+    let [a, b, c] = places.map(|place| words[place]);
+    let all = a & b & c;
+    let differ = (a | b | c) & !all;
+    (differ >> H1) & (differ >> H2) & !(all >> BACK) & ONE_TEST
 }
 
 /// Computes the bits of vertices given by index: `bits` then holds those of the vertices in this list, in its order.
@@ -109,16 +111,14 @@ fn signs_of_list<S: Simd>(simd: S, world: &World, eye: Eye, vertices: &[u32], bi
             Eye::Point(eye) => towards(simd, eye, point),
             Eye::Direction(direction) => splat3(simd, direction),
         };
-        for (planes, lights) in bits.words.iter_mut().zip(world.lights.chunks(WORD_LIGHTS)) {
-            let words = signs_of_lights(simd, lights, point, normal, to_viewer);
-            for (plane, word) in planes.iter_mut().zip(words) {
-                word.store_slice(&mut plane[first..first + lanes]);
-            }
+        for (words, lights) in bits.words.iter_mut().zip(world.lights.chunks(WORD_LIGHTS)) {
+            let word = signs_of_lights(simd, lights, point, normal, to_viewer);
+            word.store_slice(&mut words[first..first + lanes]);
         }
     }
 }
 
-/// The three words of bits of up to 32 lights, the first light in the lowest bit.
+/// The word of up to [`WORD_LIGHTS`] lights.
 #[inline(always)]
 fn signs_of_lights<S: Simd>(
     simd: S,
@@ -126,10 +126,10 @@ fn signs_of_lights<S: Simd>(
     point: [S::f32s; 3],
     n: [S::f32s; 3],
     v: [S::f32s; 3],
-) -> [S::u32s; 3] {
+) -> S::u32s {
     let zero = S::f32s::splat(simd, 0.0);
     let none = S::u32s::splat(simd, 0);
-    let mut words = [none; 3];
+    let mut word = none;
     let a = dot::<S>(v, n);
     let (a_signed_square, v_square) = (a * a.abs(), dot::<S>(v, v));
     for (index, light) in lights.iter().enumerate() {
@@ -149,12 +149,12 @@ fn signs_of_lights<S: Simd>(
             (b * b.abs() * v_square).simd_gt(a_signed_square * dot::<S>(l, l)),
             a.simd_lt(zero) & b.simd_lt(zero),
         ];
-        let bit = S::u32s::splat(simd, 1 << index);
-        for (word, test) in words.iter_mut().zip(tests) {
-            *word |= test.select(bit, none);
+        for (test, first) in tests.into_iter().zip([H1, H2, BACK]) {
+            let bit = S::u32s::splat(simd, 1 << (first + index));
+            word |= test.select(bit, none);
         }
     }
-    words
+    word
 }
 
 /// Rounded term by term, so that no level differs.
@@ -257,16 +257,13 @@ mod tests {
                             let point = vector(world.positions.get(v as usize));
                             let normal = vector(world.normals.get(v as usize));
                             let (values, back) = by_angles(point, normal, &eye, light);
-                            let bit = |plane: usize| {
-                                bits.words[index / 32][plane][place] >> (index % 32) & 1 == 1
+                            let bit = |test: usize| {
+                                let word = bits.words[index / WORD_LIGHTS][place];
+                                word >> (test + index % WORD_LIGHTS) & 1 == 1
                             };
-                            for plane in [H1, H2] {
-                                if values[plane].abs() > 1e-5 {
-                                    assert_eq!(
-                                        bit(plane),
-                                        values[plane] > 0.0,
-                                        "{level} {v} {index}"
-                                    );
+                            for (value, test) in values.into_iter().zip([H1, H2]) {
+                                if value.abs() > 1e-5 {
+                                    assert_eq!(bit(test), value > 0.0, "{level} {v} {index}");
                                 }
                             }
                             assert_eq!(bit(BACK), back, "{level} {v} {index}");

@@ -27,8 +27,8 @@ const SHARES_PER_THREAD: usize = 4;
 /// A triangle of fewer pixels is ranked by its corners alone: a sample would cost as much as shading some of them.
 const PIXELS_FOR_CENTROID: u32 = 8;
 
-/// Entries of the table that finds vertices of a block again, a power of two.
-const TABLE: usize = 2048;
+/// Most vertices of a block, and one more; a power of two, as no index is checked then.
+const LISTED: usize = (3 * BLOCK + 1).next_power_of_two();
 
 /// What blocks are collected from.
 #[derive(Clone, Copy)]
@@ -58,13 +58,13 @@ struct Tally {
 #[derive(Debug)]
 pub(super) struct Collector {
     /// Vertices of the block's triangles.
-    vertices: Vec<u32>,
+    vertices: Box<[u32; LISTED]>,
     /// The place in `vertices` of the last vertex with each remainder; of an older block where it does not hold it.
-    table: Box<[u16; TABLE]>,
+    table: Box<[u16; LISTED]>,
     /// Places in `vertices` of the triangles' corners.
-    corners: Vec<[u16; 3]>,
+    corners: Box<[[u16; 3]; BLOCK]>,
     /// What [`ranking::lightness`] says, by place.
-    lightness: Vec<f32>,
+    lightness: Box<[f32; LISTED]>,
     signs: SignBits,
     samples: Samples,
     /// One for each block of the share.
@@ -76,10 +76,10 @@ impl Collector {
         let mut samples = Samples::default();
         samples.reserve(BLOCK);
         Self {
-            vertices: Vec::with_capacity(3 * BLOCK),
-            table: Box::new([0; TABLE]),
-            corners: Vec::with_capacity(BLOCK),
-            lightness: Vec::with_capacity(3 * BLOCK),
+            vertices: Box::new([0; LISTED]),
+            table: Box::new([0; LISTED]),
+            corners: Box::new([[0; 3]; BLOCK]),
+            lightness: Box::new([0.0; LISTED]),
             signs: SignBits::default(),
             samples,
             tallies: Vec::new(),
@@ -101,9 +101,9 @@ impl Collector {
         roots: &mut [Root],
         ranks: &mut [Rank],
     ) -> Tally {
-        self.list_vertices(source.world, roots);
         let mut tally = Tally::default();
-        self.guess_from_corners(source, roots, &mut tally);
+        let vertices = self.list_vertices(source.world, roots);
+        self.guess_from_corners(source, vertices, roots, &mut tally);
         if !source.ranking.by_area {
             self.sample_centroids(source, roots);
         }
@@ -117,48 +117,54 @@ impl Collector {
         tally
     }
 
-    /// Lists the vertices of some triangles, and which of them are their corners.
-    fn list_vertices(&mut self, world: &World, roots: &[Root]) {
-        self.vertices.clear();
-        self.corners.clear();
-        for root in roots {
-            self.corners
-                .push(world.triangles[root.triangle as usize].map(|vertex| {
-                    let known = &mut self.table[vertex as usize % TABLE];
-                    if self.vertices.get(usize::from(*known)) != Some(&vertex) {
-                        *known = self.vertices.len() as u16;
-                        self.vertices.push(vertex);
-                    }
-                    *known
-                }));
+    /// Lists the vertices of some triangles, and which of them are their corners. Says how many they are.
+    fn list_vertices(&mut self, world: &World, roots: &[Root]) -> usize {
+        let mut count = 0;
+        for (root, corners) in roots.iter().zip(self.corners.iter_mut()) {
+            for (vertex, corner) in world.triangles[root.triangle as usize].iter().zip(corners) {
+                // Without branches: whether a vertex is known can hardly be predicted.
+                let entry = &mut self.table[*vertex as usize % LISTED];
+                let place = usize::from(*entry);
+                let is_known = (place < count) & (self.vertices[place % LISTED] == *vertex);
+                self.vertices[count % LISTED] = *vertex;
+                *entry = if is_known { place } else { count } as u16;
+                *corner = *entry;
+                count += usize::from(!is_known);
+            }
         }
+        count
     }
 
     /// Tests for highlights, and guesses errors, by what is known at the corners.
-    fn guess_from_corners(&mut self, source: &Source<'_>, roots: &mut [Root], tally: &mut Tally) {
+    fn guess_from_corners(
+        &mut self,
+        source: &Source<'_>,
+        vertices: usize,
+        roots: &mut [Root],
+        tally: &mut Tally,
+    ) {
         let Source { world, view, .. } = *source;
-        self.lightness.clear();
-        self.lightness.extend(
-            self.vertices
-                .iter()
-                .map(|&v| ranking::lightness(view.encoding, source.colours.get(v as usize))),
-        );
-        let is_specular = |triangle: u32| {
-            let material = world.triangle_material[triangle as usize];
-            world.materials[usize::from(material)].is_specular()
-        };
-        let is_any_specular = roots.iter().any(|root| is_specular(root.triangle));
-        if is_any_specular {
-            let signs = &mut self.signs;
-            highlight::compute_signs(source.exec.level, world, view.eye, &self.vertices, signs);
+        let vertices = &self.vertices[..vertices];
+        for (&vertex, lightness) in vertices.iter().zip(self.lightness.iter_mut()) {
+            *lightness = ranking::lightness(view.encoding, source.colours.get(vertex as usize));
         }
-        for (root, &corners) in roots.iter_mut().zip(&self.corners) {
+        let mut specular = 0;
+        for root in roots.iter_mut() {
+            let material = world.triangle_material[root.triangle as usize];
+            // To be tested.
+            root.is_pht = world.materials[usize::from(material)].is_specular();
+            specular += u64::from(root.is_pht);
+        }
+        tally.matte = roots.len() as u64 - specular;
+        if specular > 0 {
+            let signs = &mut self.signs;
+            highlight::compute_signs(source.exec.level, world, view.eye, vertices, signs);
+        }
+        for (root, &corners) in roots.iter_mut().zip(self.corners.iter()) {
             let corners = corners.map(usize::from);
-            let is_specular = is_specular(root.triangle);
-            root.is_pht = is_specular && self.signs.is_pht(corners);
-            root.prior =
-                ranking::prior_error(corners.map(|place| self.lightness[place]), root.is_pht);
-            tally.matte += u64::from(!is_specular);
+            root.is_pht = root.is_pht && self.signs.is_pht(corners);
+            let lightness = corners.map(|place| self.lightness[place % LISTED]);
+            root.prior = ranking::prior_error(lightness, root.is_pht);
             tally.phts += u64::from(root.is_pht);
         }
     }
