@@ -43,7 +43,18 @@ pub struct SignBits {
 }
 
 impl SignBits {
-    /// Makes room for `vertices` vertices under `lights` lights. Allocates only when there were never so many.
+    /// Makes room for the bits of `vertices` vertices under `lights` lights.
+    pub fn reserve(&mut self, vertices: usize, lights: usize) {
+        let words = lights.min(MAX_LIGHTS).div_ceil(WORD_LIGHTS);
+        self.words
+            .resize_with(words.max(self.words.len()), Default::default);
+        for words in &mut self.words {
+            let room = vertices.next_multiple_of(MAX_LANES);
+            words.reserve(room.saturating_sub(words.len()));
+        }
+    }
+
+    /// Takes as many vertices under as many lights. Allocates only when there were never so many.
     fn resize(&mut self, vertices: usize, lights: usize) {
         let words = lights.min(MAX_LIGHTS).div_ceil(WORD_LIGHTS);
         self.words.resize_with(words, Default::default);

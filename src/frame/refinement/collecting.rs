@@ -24,6 +24,12 @@ const BLOCK: usize = 512;
 /// Shares of a piece per thread: a thread that comes late leaves some of its own to others.
 const SHARES_PER_THREAD: usize = 4;
 
+/// Blocks of a share, as a rule at most.
+const BLOCKS_IN_SHARE: usize = 64;
+
+/// Materials in a block, as a rule at most.
+const MATERIALS_IN_BLOCK: usize = 4;
+
 /// A triangle of fewer pixels is ranked by its corners alone: a sample would cost as much as shading some of them.
 const PIXELS_FOR_CENTROID: u32 = 8;
 
@@ -39,6 +45,8 @@ struct Source<'a> {
     /// Linear colours of the vertices.
     colours: &'a Vec3s,
     ranking: RootRanking<'a>,
+    /// No material lacks a specular term.
+    all_specular: bool,
     /// Triangles of fewer pixels are no candidates.
     least_pixels: u32,
 }
@@ -73,17 +81,26 @@ pub(super) struct Collector {
 
 impl Collector {
     fn new() -> Self {
-        let mut samples = Samples::default();
-        samples.reserve(BLOCK);
         Self {
             vertices: Box::new([0; LISTED]),
             table: Box::new([0; LISTED]),
             corners: Box::new([[0; 3]; BLOCK]),
             lightness: Box::new([0.0; LISTED]),
             signs: SignBits::default(),
-            samples,
+            samples: Samples::default(),
             tallies: Vec::new(),
         }
+    }
+
+    /// Makes room, once for a world, for any block and as a rule any share.
+    fn make_room(&mut self, world: &World) {
+        self.signs.reserve(3 * BLOCK, world.lights.len());
+        self.samples.clear();
+        // Samples are kept by material.
+        let materials = world.materials.len().clamp(1, MATERIALS_IN_BLOCK);
+        self.samples.reserve(BLOCK * materials);
+        self.tallies.clear();
+        self.tallies.reserve(BLOCKS_IN_SHARE);
     }
 
     /// Collects the triangles of a share, of which the ids and pixels are known.
@@ -148,21 +165,20 @@ impl Collector {
         for (&vertex, lightness) in vertices.iter().zip(self.lightness.iter_mut()) {
             *lightness = ranking::lightness(view.encoding, source.colours.get(vertex as usize));
         }
-        let mut specular = 0;
-        for root in roots.iter_mut() {
-            let material = world.triangle_material[root.triangle as usize];
-            // To be tested.
-            root.is_pht = world.materials[usize::from(material)].is_specular();
-            specular += u64::from(root.is_pht);
-        }
-        tally.matte = roots.len() as u64 - specular;
-        if specular > 0 {
+        let is_specular = |triangle: u32| {
+            let material = world.triangle_material[triangle as usize];
+            world.materials[usize::from(material)].is_specular()
+        };
+        let is_tested = |root: &Root| source.all_specular || is_specular(root.triangle);
+        let tested = roots.iter().filter(|root| is_tested(root)).count();
+        tally.matte = (roots.len() - tested) as u64;
+        if tested > 0 {
             let signs = &mut self.signs;
             highlight::compute_signs(source.exec.level, world, view.eye, vertices, signs);
         }
         for (root, &corners) in roots.iter_mut().zip(self.corners.iter()) {
             let corners = corners.map(usize::from);
-            root.is_pht = root.is_pht && self.signs.is_pht(corners);
+            root.is_pht = is_tested(root) && self.signs.is_pht(corners);
             let lightness = corners.map(|place| self.lightness[place % LISTED]);
             root.prior = ranking::prior_error(lightness, root.is_pht);
             tally.phts += u64::from(root.is_pht);
@@ -197,10 +213,27 @@ fn mean(v: [[f32; 3]; 3]) -> [f32; 3] {
     std::array::from_fn(|k| (v[0][k] + v[1][k] + v[2][k]) / 3.0)
 }
 
+/// Into how many shares a piece is cut.
+fn shares(exec: Exec) -> usize {
+    match exec.threads {
+        1 => 1,
+        threads => threads * SHARES_PER_THREAD,
+    }
+}
+
 impl Refinement {
     /// Whether visible triangles are left that are not candidates yet.
     pub(super) fn is_collecting(&self) -> bool {
         self.roots.len() < self.visible
+    }
+
+    /// Makes room for collecting in pieces.
+    pub(super) fn make_collectors(&mut self, exec: Exec, world: &World) {
+        let shares = shares(exec).max(self.collectors.len());
+        self.collectors.resize_with(shares, Collector::new);
+        for collector in &mut self.collectors {
+            collector.make_room(world);
+        }
     }
 
     /// Makes the next visible triangles candidates. False when the budget does not admit it.
@@ -247,14 +280,9 @@ impl Refinement {
     fn collect_from(&mut self, stage: &Stage<'_>, first: usize) {
         let roots = &mut self.roots[first..];
         let ranks = self.ranked_roots.extend(roots.len());
-        let shares = match stage.exec.threads {
-            1 => 1,
-            threads => threads * SHARES_PER_THREAD,
-        };
-        let share = roots.len().div_ceil(BLOCK).div_ceil(shares) * BLOCK;
-        if self.collectors.len() < shares {
-            self.collectors.resize_with(shares, Collector::new);
-        }
+        // A still view may go on with more threads.
+        let shares = shares(stage.exec).min(self.collectors.len());
+        let share = (roots.len().div_ceil(BLOCK).div_ceil(shares) * BLOCK).max(BLOCK);
         let source = Source {
             exec: stage.exec,
             world: stage.world,
@@ -266,6 +294,7 @@ impl Refinement {
                 by_area: self.by_area,
                 is_drawn_once: self.is_drawn_once,
             },
+            all_specular: stage.world.materials.iter().all(|m| m.is_specular()),
             least_pixels: if self.is_drawn_once {
                 drawn_once::LEAST_PIXELS
             } else {
@@ -274,16 +303,10 @@ impl Refinement {
         };
         let collectors = &mut self.collectors[..shares];
         let exec = stage.exec;
-        exec.for_each_chunk_with(
-            collectors,
-            roots,
-            ranks,
-            share.max(1),
-            |own, roots, ranks| {
-                own.collect(&source, roots, ranks);
-            },
-        );
-        let used = roots.len().div_ceil(share.max(1));
+        exec.for_each_chunk_with(collectors, roots, ranks, share, |own, roots, ranks| {
+            own.collect(&source, roots, ranks);
+        });
+        let used = roots.len().div_ceil(share);
         let tallies = self.collectors[..used].iter().flat_map(|own| &own.tallies);
         for tally in tallies {
             self.pixels += tally.pixels;
@@ -294,3 +317,6 @@ impl Refinement {
         self.ranked_roots.admit(first);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -298,6 +298,7 @@ impl Refinement {
         let visible = backend.visible_triangles();
         self.visible = visible.len();
         self.roots.reserve(visible.len());
+        self.make_collectors(exec, world);
         self.ranked_roots.reserve(visible.len());
         let capabilities = backend.capabilities();
         self.is_drawn_once = !capabilities.refines_in_place();
