@@ -59,6 +59,27 @@ fn an_image_under_a_budget_of_work_does_not_depend_on_threads() {
 }
 
 #[test]
+fn an_image_under_a_budget_of_work_depends_on_nothing_that_was_found_before() {
+    let mut scene = scene();
+    let clock = ManualClock::default();
+    let mut engine = engine(&scene, 1, &clock);
+    let mut frame = Frame::new(SIZE.0, SIZE.1);
+    // The clock stands still, so that everything is looked at.
+    engine.render(&scene, Budget::from_millis(1.0), &mut frame);
+    let camera = *scene.camera();
+    scene.set_camera(specula::scene::Camera {
+        position: camera.position * 1.02,
+        ..camera
+    });
+    let budget = Budget::Work(300_000);
+    let stats = engine.render(&scene, budget, &mut frame);
+    let mut fresh = Frame::new(SIZE.0, SIZE.1);
+    let want = self::engine(&scene, 1, &clock).render(&scene, budget, &mut fresh);
+    assert_eq!(described(&stats), described(&want));
+    assert!(frame.pixels() == fresh.pixels());
+}
+
+#[test]
 fn what_the_clock_cuts_short_goes_on_in_the_next_frame_and_comes_to_the_same() {
     let scene = scene();
     let budget = Budget::Work(500_000);
@@ -85,7 +106,10 @@ fn what_the_clock_cuts_short_goes_on_in_the_next_frame_and_comes_to_the_same() {
         assert!(known.len() < 100, "it does not go on");
         known.push(stats.pht);
     }
-    assert!(known[0] < want.pht, "the first frame had time for everything");
+    assert!(
+        known[0] < want.pht,
+        "the first frame had time for everything"
+    );
 
     // Again, with what follows under a budget of work.
     engine.forget();

@@ -152,9 +152,11 @@ impl Engine {
         self.renderer.handed_over.clear();
     }
 
-    /// Forgets the current image, so that the next frame starts cold. Memory stays allocated and threads stay awake.
+    /// Forgets the current image, and what was found out in those before, so that the next frame starts cold. Memory stays
+    /// allocated and threads stay awake.
     pub fn forget(&mut self) {
         self.renderer.seen = None;
+        self.renderer.refinement.forget();
     }
 
     /// Calls `f` with everything that the current image consists of: visible triangles, or the leaves and parts that

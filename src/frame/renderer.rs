@@ -195,6 +195,7 @@ impl Renderer {
             }
             GeometryChange::Replaced => {
                 self.base = BaseImage::new(&self.world);
+                self.refinement.forget();
                 self.seen = None;
             }
         }
@@ -257,6 +258,7 @@ impl Renderer {
 
         // Which triangles can hold a highlight, and what is worth refining, is found out piece by piece.
         if self.method.is_progressive() {
+            self.refinement.set_remembering(allowance.has_deadline());
             self.refinement
                 .begin(exec, self.method, &self.world, view, &self.base, backend);
         } else {

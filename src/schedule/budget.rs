@@ -9,7 +9,8 @@ use crate::clock::Clock;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
     /// Wall-clock milliseconds from the call of `render` to its return, by the engine's clock. Refinement stops in time;
-    /// a first image that takes longer is completed late, and the outcome says so.
+    /// a first image that takes longer is completed late, and the outcome says so. Of an image begun under such a budget,
+    /// what refinement found out in the images before decides what is looked at first; under any other budget it has no influence.
     Millis(f64),
     /// Work units: nominal nanoseconds of refinement (see [`cost`](super::cost)). The result is the same, bit for
     /// bit, for any number of threads and at any speed of the machine. A step is done whole or not at all, and the best
@@ -75,7 +76,7 @@ impl<'a> Allowance<'a> {
     /// frame's refinement like [`admit`](Self::admit): only a wall-clock budget can refuse it.
     #[must_use]
     pub fn admit_free(&mut self, nominal_ns: u64) -> bool {
-        if let Budget::Millis(_) = self.budget {
+        if self.has_deadline() {
             self.is_over = self.is_over || !self.has_room_for(nominal_ns);
         }
         !self.is_over
@@ -90,6 +91,12 @@ impl<'a> Allowance<'a> {
                 self.elapsed_ms() + needed <= ms
             }
         }
+    }
+
+    /// Whether the budget is one of wall-clock time.
+    #[must_use]
+    pub fn has_deadline(&self) -> bool {
+        matches!(self.budget, Budget::Millis(_))
     }
 
     /// Nominal nanoseconds that are left.

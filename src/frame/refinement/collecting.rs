@@ -8,6 +8,7 @@
 //! Triangles are taken in blocks of [`BLOCK`]. Inside a block what is needed of a vertex is worked out once, as a rule:
 //! where two vertices share a place in a small table, some of it is done again, to the same result.
 
+use super::memory::Memory;
 use super::painting::piece_limit;
 use super::ranking::{self, RootRanking};
 use super::{PIECE_UNITS, Refinement, Root, Stage, drawn_once};
@@ -47,6 +48,8 @@ struct Source<'a> {
     ranking: RootRanking<'a>,
     /// No material lacks a specular term.
     all_specular: bool,
+    /// What is remembered, if anything may be.
+    memory: Option<&'a Memory>,
     /// Triangles of fewer pixels are no candidates.
     least_pixels: u32,
 }
@@ -74,6 +77,8 @@ pub(super) struct Collector {
     /// What [`ranking::lightness`] says, by place.
     lightness: Box<[f32; LISTED]>,
     signs: SignBits,
+    /// Whether the triangles' centroids are sampled.
+    is_sampled: Box<[bool; BLOCK]>,
     samples: Samples,
     /// One for each block of the share.
     tallies: Vec<Tally>,
@@ -87,6 +92,7 @@ impl Collector {
             corners: Box::new([[0; 3]; BLOCK]),
             lightness: Box::new([0.0; LISTED]),
             signs: SignBits::default(),
+            is_sampled: Box::new([false; BLOCK]),
             samples: Samples::default(),
             tallies: Vec::new(),
         }
@@ -122,6 +128,7 @@ impl Collector {
         let vertices = self.list_vertices(source.world, roots);
         self.guess_from_corners(source, vertices, roots, &mut tally);
         if !source.ranking.by_area {
+            self.recall(source, roots);
             self.sample_centroids(source, roots);
         }
         for (root, rank) in roots.iter().zip(ranks) {
@@ -185,14 +192,33 @@ impl Collector {
         }
     }
 
+    /// Puts what is remembered in place of guesses, and chooses among the other triangles those whose centroids are sampled.
+    fn recall(&mut self, source: &Source<'_>, roots: &mut [Root]) {
+        for (root, is_sampled) in roots.iter_mut().zip(self.is_sampled.iter_mut()) {
+            *is_sampled = root.pixels >= PIXELS_FOR_CENTROID;
+            if let Some(memory) = source.memory
+                && let Some(error) = memory.recall(root.triangle)
+            {
+                root.prior = error.max(ranking::ERROR_FLOOR);
+                *is_sampled = false;
+            }
+        }
+    }
+
     /// Adds to the prior error of triangles what one true colour, at their centroids, has to say.
     fn sample_centroids(&mut self, source: &Source<'_>, roots: &mut [Root]) {
         let Source { world, view, .. } = *source;
-        let is_sampled = |root: &&mut Root| root.pixels >= PIXELS_FOR_CENTROID;
-        self.samples.clear();
-        for root in roots.iter_mut().filter(is_sampled) {
+        let Self {
+            samples,
+            is_sampled,
+            ..
+        } = self;
+        samples.clear();
+        let sampled = || (0..roots.len()).filter(|&index| is_sampled[index]);
+        for index in sampled() {
+            let root = &roots[index];
             let corners = world.triangles[root.triangle as usize].map(|v| v as usize);
-            self.samples.push(
+            samples.push(
                 mean(corners.map(|v| world.positions.get(v))),
                 mean(corners.map(|v| world.normals.get(v))),
                 world.triangle_material[root.triangle as usize],
@@ -200,10 +226,10 @@ impl Collector {
             );
         }
         let exec = source.exec.on_one_thread();
-        self.samples.illuminate(exec, world, view);
-        for (sample, root) in roots.iter_mut().filter(is_sampled).enumerate() {
-            let [r, g, b] = self.samples.deviation(sample);
-            root.prior += ranking::CENTROID_SHARE * (r * r + g * g + b * b) / 3.0;
+        samples.illuminate(exec, world, view);
+        for (sample, index) in sampled().enumerate() {
+            let [r, g, b] = samples.deviation(sample);
+            roots[index].prior += ranking::CENTROID_SHARE * (r * r + g * g + b * b) / 3.0;
         }
     }
 }
@@ -294,6 +320,7 @@ impl Refinement {
                 by_area: self.by_area,
                 is_drawn_once: self.is_drawn_once,
             },
+            memory: self.remembers.then_some(&self.memory),
             all_specular: stage.world.materials.iter().all(|m| m.is_specular()),
             least_pixels: if self.is_drawn_once {
                 drawn_once::LEAST_PIXELS

@@ -19,6 +19,7 @@
 mod collecting;
 mod drawn_once;
 mod leaves;
+mod memory;
 mod painting;
 mod parts;
 mod places;
@@ -39,6 +40,7 @@ use collecting::Collector;
 pub(super) use drawn_once::DrawnLeaves;
 pub(super) use leaves::for_each_leaf;
 pub use leaves::{Leaf, LeafKind};
+use memory::Memory;
 use parts::Part;
 use places::Places;
 use std::collections::VecDeque;
@@ -80,7 +82,7 @@ enum Candidate {
 struct Root {
     triangle: u32,
     pixels: u32,
-    /// Mean squared error, guessed before anything was looked at.
+    /// Mean squared error, guessed or remembered, before anything was looked at.
     prior: f32,
     /// Where in [`Refinement::shadings`] it is said how its pixels are shaded, once that has been asked; or [`NONE`].
     shading: u32,
@@ -181,6 +183,9 @@ pub(super) struct Refinement {
     /// In the order of their triangles.
     roots: Vec<Root>,
     places: Places,
+    memory: Memory,
+    /// Whether what is remembered takes the place of guesses.
+    remembers: bool,
     shadings: Vec<RootShading>,
     collectors: Vec<Collector>,
     /// Time spent on collecting since it was last asked for.
@@ -250,6 +255,16 @@ impl Refinement {
         self.counters = Counters::default();
     }
 
+    /// Forgets what was found out about triangles in earlier images.
+    pub(super) fn forget(&mut self) {
+        self.memory.forget();
+    }
+
+    /// Whether the image that begins next remembers what was found out in those before.
+    pub(super) fn set_remembering(&mut self, remembers: bool) {
+        self.remembers = remembers;
+    }
+
     /// Makes room, once for an image size, for what is on the lists as a rule at most while the view moves.
     fn make_room(&mut self, view: &View) {
         let pixels = view.width as usize * view.height as usize;
@@ -293,6 +308,7 @@ impl Refinement {
         self.make_room(view);
         self.forest.reset(world);
         self.places.reset(world.triangles.len());
+        self.memory.next_image(world.triangles.len());
         // The rival knows areas only: no estimates, no bounds, no subdivision.
         self.by_area = method == Method::PhongArea;
         let visible = backend.visible_triangles();

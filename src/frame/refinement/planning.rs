@@ -203,6 +203,8 @@ impl Refinement {
         if let Some(index) = self.root_of(self.forest.leaf(leaf).triangle) {
             let root = &mut self.roots[index as usize];
             root.progress = Progress::Planted;
+            self.memory
+                .note(root.triangle, self.forest.leaf(leaf).error);
             self.error_mass -= root.mass();
             self.error_mass += self.leaf_mass(leaf);
         }

@@ -72,6 +72,17 @@ impl Image {
     /// Collects everything, with a budget of its own for each piece.
     fn collect(&mut self, exec: Exec, method: Method, budget: Budget) -> Refinement {
         let mut refinement = Refinement::default();
+        self.collect_into(&mut refinement, exec, method, budget);
+        refinement
+    }
+
+    fn collect_into(
+        &mut self,
+        refinement: &mut Refinement,
+        exec: Exec,
+        method: Method,
+        budget: Budget,
+    ) {
         let (world, view) = (&self.world, &self.view);
         refinement.begin(exec, method, world, view, &self.base, &self.backend);
         let mut stage = Stage {
@@ -91,7 +102,6 @@ impl Image {
             pieces += 1;
         }
         assert!(pieces > 1, "all at once");
-        refinement
     }
 }
 
@@ -167,10 +177,7 @@ fn check(refinement: &mut Refinement, expected: &[Expected]) {
     assert!(got == order, "the order differs");
     let phts = expected.iter().filter(|e| e.3).count() as u64;
     assert_eq!(refinement.counters.phts, phts);
-    assert!(
-        phts > 50 && phts < expected.len() as u64 / 2,
-        "{phts} PHTs"
-    );
+    assert!(phts > 50 && phts < expected.len() as u64 / 2, "{phts} PHTs");
     assert!(refinement.counters.matte > 100);
     let mass: f64 = expected
         .iter()
@@ -201,6 +208,36 @@ fn candidates_are_those_of_single_triangles_whatever_the_pieces_and_threads() {
         }
         assert!(masses.iter().all(|&mass| mass == masses[0]), "{masses:?}");
     }
+}
+
+#[test]
+fn what_was_found_takes_the_place_of_guesses_where_it_may() {
+    let level = SimdLevel::detect().token().expect("detected");
+    let exec = Exec { level, threads: 1 };
+    let mut image = Image::new(exec);
+    let cold = expected(exec, &image, Method::Adaptive);
+    let mut refinement = image.collect(exec, Method::Adaptive, Budget::Unlimited);
+    for remembers in [true, false] {
+        for (index, &(triangle, ..)) in cold.iter().enumerate().step_by(3) {
+            refinement.memory.note(triangle, index as f32);
+        }
+        refinement.set_remembering(remembers);
+        image.collect_into(&mut refinement, exec, Method::Adaptive, Budget::Unlimited);
+        for (index, (root, &(_, _, guess, is_pht, _))) in
+            refinement.roots.iter().zip(&cold).enumerate()
+        {
+            let want = match (remembers, index % 3) {
+                (true, 0) => (index as f32).max(ranking::ERROR_FLOOR),
+                _ => guess,
+            };
+            assert_eq!((root.prior, root.is_pht), (want, is_pht), "root {index}");
+        }
+    }
+    // Everything can be forgotten.
+    refinement.forget();
+    refinement.set_remembering(true);
+    image.collect_into(&mut refinement, exec, Method::Adaptive, Budget::Unlimited);
+    check(&mut refinement, &cold);
 }
 
 #[test]
