@@ -36,9 +36,9 @@ pub const BOUNDS_NS: f32 = 190.0;
 /// See [`BOUNDS_NS`].
 pub const BOUNDS_LIGHT_NS: f32 = 153.0;
 /// Making a visible triangle a candidate: a part for each triangle, and one for each light. They cost no work units.
-pub const COLLECT_NS: f32 = 20.0;
+pub const COLLECT_NS: f32 = 36.0;
 /// See [`COLLECT_NS`].
-pub const COLLECT_LIGHT_NS: f32 = 0.5;
+pub const COLLECT_LIGHT_NS: f32 = 0.7;
 /// Copying a pixel into the caller's frame, until the engine has measured it: see [`LearnedRate`](super::LearnedRate).
 pub const PRESENT_PIXEL_NS: f32 = 0.4;
 
