@@ -84,7 +84,6 @@ fn classification(c: &mut Criterion) {
         let world = patch(ReflectionModel::Phong, count);
         let vertices: Vec<u32> = (0..world.positions.len() as u32).collect();
         let mut bits = SignBits::default();
-        bits.resize(&world);
         group.throughput(Throughput::Elements((vertices.len() * count) as u64));
         for level in SimdLevel::available() {
             let Some(token) = level.token() else { continue };

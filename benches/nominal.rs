@@ -4,7 +4,6 @@
 //! is the median of many rounds; where a cost has a fixed part and a part per pixel, light or patch, both come from a
 //! least-squares line through measurements of several sizes. `--test` runs everything once.
 
-use specula::Frame;
 use specula::backend::software::SoftwareBackend;
 use specula::backend::{Backend, BasePaint, Fill, Geometry, Patch};
 use specula::geometry::{Bary, Vec3s};
@@ -14,6 +13,7 @@ use specula::parallel::Exec;
 use specula::refine::Forest;
 use specula::scene::{Scene, View, World};
 use specula::simd::SimdLevel;
+use specula::{Budget, Engine, EngineOptions, Frame};
 use std::ops::Range;
 use std::time::Instant;
 
@@ -49,6 +49,7 @@ fn main() {
         println!("phong_pixel_{count}_lights,{:.2},-,0", bench.phong_pixel());
     }
     report("sign_test_vertex", "light", per_light(&Bench::signs));
+    report("collect_triangle", "light", per_light(&Bench::collect));
     report("bounds_triangle", "light", per_light(&Bench::bounds));
     report("plan_leaf", "light", per_light(&Bench::plan_leaf));
 
@@ -107,7 +108,8 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(lights: usize, exec: Exec, rounds: usize) -> Self {
+    /// The scene, the teapot that finely cut.
+    fn scene(lights: usize, tessellation: u32) -> Scene {
         let light = |i: usize| {
             let angle = i as f64 * 2.4;
             let (x, y) = (6.0 * angle.cos(), 6.0 * angle.sin() - 6.0);
@@ -123,10 +125,14 @@ impl Bench {
                 camera: Perspective(position: (0, -5, 3), target: (0, 0, 1.2), fov_degrees: 40),
                 lights: [{list}],
                 materials: {{ "m": (diffuse: (0.6, 0.3, 0.2), specular: (0.5, 0.5, 0.5), shininess: 50) }},
-                objects: [(shape: Teapot(tessellation: 4), material: "m")],
+                objects: [(shape: Teapot(tessellation: {tessellation}), material: "m")],
             )"#
         );
-        let scene = Scene::parse(&text, "bench").expect("a valid scene");
+        Scene::parse(&text, "bench").expect("a valid scene")
+    }
+
+    fn new(lights: usize, exec: Exec, rounds: usize) -> Self {
+        let scene = Self::scene(lights, 4);
         let world = World::new(&scene);
         let view = world.view(scene.camera(), SIZE.0, SIZE.1);
         let mut colours = Vec3s::default();
@@ -209,7 +215,6 @@ impl Bench {
     fn signs(&self) -> f64 {
         let vertices: Vec<u32> = (0..self.world.positions.len() as u32).collect();
         let mut signs = SignBits::default();
-        signs.resize(&self.world);
         let ns = self.median_ns(|| {
             compute_signs(
                 self.exec.level,
@@ -220,6 +225,27 @@ impl Bench {
             );
         });
         ns / vertices.len() as f64
+    }
+
+    /// Making a visible triangle a candidate, where triangles are too small for their centroids to be sampled.
+    fn collect(&self) -> f64 {
+        let scene = Self::scene(self.world.lights.len(), 32);
+        let options = EngineOptions {
+            threads: Some(1),
+            ..EngineOptions::default()
+        };
+        let mut engine = Engine::with_options(&scene, options).expect("an engine");
+        let mut frame = Frame::new(320, 180);
+        let mut times: Vec<f64> = (0..=self.rounds)
+            .map(|_| {
+                engine.forget();
+                let stats = engine.render(&scene, Budget::Work(0), &mut frame);
+                stats.stage_ms.classify * 1e6 / stats.triangles_visible as f64
+            })
+            .skip(1)
+            .collect();
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
     }
 
     fn bounds(&self) -> f64 {

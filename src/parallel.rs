@@ -255,6 +255,34 @@ impl Exec {
         }
     }
 
+    /// As [`for_each_chunk2`](Self::for_each_chunk2), with a workspace for each chunk.
+    pub fn for_each_chunk_with<W: Send, A: Send, B: Send>(
+        &self,
+        workspaces: &mut [W],
+        a: &mut [A],
+        b: &mut [B],
+        size: usize,
+        f: impl Fn(&mut W, &mut [A], &mut [B]) + Send + Sync,
+    ) {
+        use rayon::prelude::*;
+        debug_assert!(
+            a.len().div_ceil(size) <= workspaces.len(),
+            "there are not enough workspaces"
+        );
+        if self.threads > 1 && a.len() > size {
+            let chunks = a.par_chunks_mut(size).zip(b.par_chunks_mut(size));
+            workspaces
+                .par_iter_mut()
+                .zip(chunks)
+                .for_each(|(own, (a, b))| f(own, a, b));
+        } else {
+            let chunks = a.chunks_mut(size).zip(b.chunks_mut(size));
+            for (own, (a, b)) in workspaces.iter_mut().zip(chunks) {
+                f(own, a, b);
+            }
+        }
+    }
+
     /// Runs `f(index)` for every index below `count`, in parallel if there are threads for it.
     pub fn for_each_index(&self, count: usize, f: impl Fn(usize) + Send + Sync) {
         use rayon::prelude::*;

@@ -457,7 +457,6 @@ fn masks_find_every_triangle_with_a_visible_specular_deviation() {
             let position = random.direction() * random.between(2.0, 6.0);
             let eye = Eye::Point(single(position));
             let mut bits = SignBits::default();
-            bits.resize(&world);
             let all: Vec<u32> = (0..world.positions.len() as u32).collect();
             compute_signs(level, &world, eye, &all, &mut bits);
             for (triangle, &corners) in world.triangles.iter().enumerate() {
@@ -479,7 +478,7 @@ fn masks_find_every_triangle_with_a_visible_specular_deviation() {
                     let interpolated: f64 = w.iter().zip(at_corners).map(|(w, s)| w * s).sum();
                     (case.at(w, 0).specular - interpolated).abs() > 4.0 / 255.0
                 });
-                let by_signs = !bits.pht_lights(corners).is_empty();
+                let by_signs = !bits.pht_lights(corners.map(|v| v as usize)).is_empty();
                 let by_bound = !light_masks(&world, &eye, Encoding::Srgb, triangle as u32)
                     .active
                     .specular

@@ -263,9 +263,8 @@ impl Report<'_> {
             return vec![bounds];
         }
         let tested = format!(
-            "  highlights  {}, {} visible on {}, {} refined",
-            counted(pht.total, "PHT"),
-            pht.visible,
+            "  highlights  {} visible on {}, {} refined",
+            counted(pht.visible, "PHT"),
             counted(pht.pixels, "pixel"),
             pht.refined
         );

@@ -4,7 +4,6 @@ use super::Method;
 use super::stats::FrameStats;
 use crate::backend::{Backend, BasePaint, Geometry, RasterCounts};
 use crate::geometry::Vec3s;
-use crate::highlight::{self, SignBits};
 use crate::illumination::{PointBatch, VertexSet};
 use crate::parallel::{Exec, Turn};
 use crate::scene::{View, World};
@@ -12,50 +11,22 @@ use crate::visibility::{CullCounts, Culler};
 use std::ops::Range;
 
 /// The first image of a view, and what was learned while drawing it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct BaseImage {
     visible: Vec<Range<u32>>,
     /// Linear colours: of vertices, or of triangles if shading is flat. Those of visible triangles are valid.
     colours: Vec3s,
-    signs: SignBits,
     /// Vertices of visible triangles while they are illuminated.
     corners: VertexSet,
     /// Centroids, likewise.
     batch: PointBatch,
-    /// Vertices that the sign tests are made at.
-    vertices: Vec<u32>,
-    /// The image for which a vertex was last put on a list.
-    stamp: Vec<u32>,
-    image: u32,
     culled: CullCounts,
     raster: RasterCounts,
     /// Triangles that own a pixel.
     visible_triangles: u64,
-    pht: u64,
-    pht_visible: u64,
-    matte_visible: u64,
 }
 
 impl BaseImage {
-    pub(super) fn new(world: &World) -> Self {
-        Self {
-            visible: Vec::new(),
-            colours: Vec3s::default(),
-            signs: SignBits::default(),
-            corners: VertexSet::default(),
-            batch: PointBatch::default(),
-            vertices: Vec::new(),
-            stamp: vec![0; world.positions.len()],
-            image: 0,
-            culled: CullCounts::default(),
-            raster: RasterCounts::default(),
-            visible_triangles: 0,
-            pht: 0,
-            pht_visible: 0,
-            matte_visible: 0,
-        }
-    }
-
     /// What there is to draw of the view last culled.
     pub(super) fn geometry<'a>(&'a self, world: &'a World, view: &'a View) -> Geometry<'a> {
         Geometry {
@@ -68,12 +39,6 @@ impl BaseImage {
     /// Linear colours of the vertices of visible triangles.
     pub(super) fn colours(&self) -> &Vec3s {
         &self.colours
-    }
-
-    /// Whether the triangle passes the paper's test for some light.
-    pub(super) fn is_pht(&self, world: &World, triangle: u32) -> bool {
-        let corners = world.triangles[triangle as usize];
-        !self.signs.pht_lights(corners).is_empty()
     }
 
     pub(super) fn cull(&mut self, culler: &mut Culler, view: &View) {
@@ -162,27 +127,6 @@ impl BaseImage {
         }
     }
 
-    /// Puts the vertices of some triangles on the list, each once, in order of first use.
-    fn list_vertices(&mut self, world: &World, triangles: impl Iterator<Item = u32>) {
-        self.image = match self.image.checked_add(1) {
-            Some(image) => image,
-            None => {
-                self.stamp.fill(0);
-                1
-            }
-        };
-        self.vertices.clear();
-        for triangle in triangles {
-            for vertex in world.triangles[triangle as usize] {
-                let stamp = &mut self.stamp[vertex as usize];
-                if *stamp != self.image {
-                    *stamp = self.image;
-                    self.vertices.push(vertex);
-                }
-            }
-        }
-    }
-
     /// One turn of giving the image its colours. False if it was told to stop.
     pub(super) fn resolve(
         &mut self,
@@ -201,59 +145,17 @@ impl BaseImage {
         backend.resolve_while(exec, self.geometry(world, view), paint, turn)
     }
 
-    /// The paper's sign tests at the vertices of everything that was handed to the rasterizer, and a count of the
-    /// triangles that pass them.
-    pub(super) fn classify(
-        &mut self,
-        exec: Exec,
-        world: &World,
-        view: &View,
-        backend: &dyn Backend,
-    ) {
-        let visible = std::mem::take(&mut self.visible);
-        let is_specular = |triangle: u32| {
-            let material = world.triangle_material[triangle as usize];
-            world.materials[usize::from(material)].is_specular()
-        };
-        let tested = || {
-            visible
-                .iter()
-                .cloned()
-                .flatten()
-                .filter(|&t| is_specular(t))
-        };
-        self.list_vertices(world, tested());
-        self.signs.resize(world);
-        highlight::compute_signs(exec.level, world, view.eye, &self.vertices, &mut self.signs);
-        (self.pht, self.pht_visible) = (0, 0);
-        for triangle in tested() {
-            if self.is_pht(world, triangle) {
-                self.pht += 1;
-                self.pht_visible += u64::from(backend.visible_pixels(triangle) > 0);
-            }
-        }
-        self.matte_visible = backend
-            .visible_triangles()
-            .iter()
-            .filter(|&&t| !is_specular(t))
-            .count() as u64;
-        self.visible = visible;
-    }
-
     /// Fills in what the first image had to do and what it did not.
     pub(super) fn report(&self, stats: &mut FrameStats) {
         stats.triangles_drawn = self.raster.drawn;
         stats.triangles_visible = self.visible_triangles;
         stats.covered_pixels = self.raster.covered_pixels;
-        stats.pht = self.pht;
-        stats.pht_visible = self.pht_visible;
         let skipped = &mut stats.skipped;
         skipped.clusters_off_screen = u64::from(self.culled.outside_frustum);
         skipped.clusters_facing_away = u64::from(self.culled.facing_away);
         skipped.triangles_facing_away = self.raster.back_facing;
         skipped.triangles_off_screen = self.raster.off_screen;
         skipped.triangles_hidden = self.raster.drawn.saturating_sub(self.visible_triangles);
-        skipped.triangles_matte = self.matte_visible;
         skipped.background_tiles = self.raster.background_tiles;
     }
 }

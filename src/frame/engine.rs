@@ -173,7 +173,8 @@ impl Engine {
         self.renderer.handover.forget();
     }
 
-    /// Forgets the current image, so that the next frame starts cold. Memory stays allocated and threads stay awake.
+    /// Forgets the current image, and what was found out in those before, so that the next frame starts cold. Memory stays
+    /// allocated and threads stay awake.
     pub fn forget(&mut self) {
         self.renderer.shelf.forget();
     }

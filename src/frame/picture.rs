@@ -81,17 +81,31 @@ pub(super) struct Easel<'a, 'b> {
     pub(super) method: Method,
     pub(super) world: &'a World,
     pub(super) costs: &'a mut CostModel,
+    pub(super) stages: &'a mut StageTimes,
     /// What was done in this frame was predicted to take.
     pub(super) predicted: &'a mut StageTimes,
     /// Where the image will go; nowhere in spare time.
     pub(super) target: Option<&'a Target<'b>>,
 }
 
+impl Easel<'_, '_> {
+    /// Books a step of refinement that took `ms` milliseconds.
+    fn book(&mut self, kind: Kind, load: Load, ms: f64) {
+        let (spent, predicted) = match kind {
+            Kind::Collect => (&mut self.stages.classify, &mut self.predicted.classify),
+            _ => (&mut self.stages.refine, &mut self.predicted.refine),
+        };
+        *spent += ms;
+        *predicted += self.costs.predict_ms(kind, load);
+        self.costs.learn(kind, load, ms);
+    }
+}
+
 impl Picture {
-    pub(super) fn new(backend: Box<dyn Backend>, world: &World) -> Self {
+    pub(super) fn new(backend: Box<dyn Backend>) -> Self {
         Self {
             backend,
-            base: BaseImage::new(world),
+            base: BaseImage::default(),
             refinement: Refinement::default(),
             refine_first: RefineFirst::default(),
             view: None,
@@ -104,8 +118,9 @@ impl Picture {
     }
 
     /// Makes it a picture of another world, of which nothing is known.
-    pub(super) fn replace_world(&mut self, world: &World) {
-        self.base = BaseImage::new(world);
+    pub(super) fn replace_world(&mut self) {
+        self.base = BaseImage::default();
+        self.refinement.forget();
         self.forget();
     }
 
@@ -274,12 +289,17 @@ impl Picture {
         if refines_first {
             let presenting_ms =
                 load::pending_ms(easel.costs, stage.backend, self.divisor, easel.target, true);
-            return self
-                .refine_first
-                .frame(refinement, &mut stage, allowance, presenting_ms);
+            let since = allowance.elapsed_ms();
+            let drawing_ms =
+                self.refine_first
+                    .frame(refinement, &mut stage, allowance, presenting_ms);
+            let drawing = drawing_ms.unwrap_or(0.0);
+            easel.stages.refine += allowance.elapsed_ms() - since - drawing;
+            easel.stages.resolve += drawing;
+            return drawing_ms;
         }
         let mut since = allowance.elapsed_ms();
-        while !allowance.is_satisfied_by(refinement.estimated_error()) {
+        while !refinement.satisfies(allowance) {
             let presenting_ms = load::pending_ms(
                 easel.costs,
                 stage.backend,
@@ -289,14 +309,13 @@ impl Picture {
             );
             allowance.reserve_ms(presenting_ms);
             let kind = refinement.next_kind();
-            let rate = |units| Load::of_items(units as f64);
-            allowance.set_ms_per_unit(easel.costs.predict_at_most_ms(kind, rate(1)));
-            let units = allowance.spent_units();
+            let ms_per_unit = easel.costs.predict_at_most_ms(kind, Load::of_items(1.0));
+            allowance.set_ms_per_unit(ms_per_unit);
+            let done_ns = allowance.nominal_ns();
             let is_done = refinement.step(&mut stage, allowance);
-            let load = rate(allowance.spent_units() - units);
-            easel.predicted.refine += easel.costs.predict_ms(kind, load);
+            let load = Load::of_items((allowance.nominal_ns() - done_ns) as f64);
             let now = allowance.elapsed_ms();
-            easel.costs.learn(kind, load, now - since);
+            easel.book(kind, load, now - since);
             since = now;
             if !is_done {
                 break;
@@ -305,21 +324,14 @@ impl Picture {
         None
     }
 
-    fn begin_refinement(
-        &mut self,
-        studio: &mut Studio<'_>,
-        allowance: &Allowance<'_>,
-        view: &View,
-    ) {
+    fn begin_refinement(&mut self, studio: &Studio<'_>, allowance: &Allowance<'_>, view: &View) {
         if !studio.method.is_progressive() {
             return self.refinement.clear();
         }
-        let since = allowance.elapsed_ms();
-        let (exec, world, backend) = (studio.exec, studio.world, &*self.backend);
-        self.base.classify(exec, world, view, backend);
+        self.refinement.set_remembering(allowance.is_timed());
+        let (exec, method, world) = (studio.exec, studio.method, studio.world);
         self.refinement
-            .collect_candidates(exec, studio.method, world, view, &self.base, backend);
-        studio.stages.classify += allowance.elapsed_ms() - since;
+            .begin(exec, method, world, view, &self.base, &*self.backend);
     }
 
     fn cull(&mut self, studio: &mut Studio<'_>, allowance: &Allowance<'_>, view: &View) -> bool {

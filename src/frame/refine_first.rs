@@ -57,7 +57,7 @@ impl RefineFirst {
         allowance: &mut Allowance<'_>,
         presenting_ms: f64,
     ) -> Option<f64> {
-        loop {
+        while !refinement.satisfies(allowance) {
             allowance.reserve_ms(self.predict_ms(refinement) + presenting_ms);
             if !refinement.step(stage, allowance) {
                 break;

@@ -85,7 +85,7 @@ impl Renderer {
             encoding,
             placement,
             culler: Culler::new(&world.clusters),
-            shelf: Shelf::new(backend, &world),
+            shelf: Shelf::new(backend),
             last_view: None,
             ladder: Ladder::default(),
             costs,
@@ -234,8 +234,7 @@ impl Renderer {
         // What was left over for a frame of its own is not left over again.
         let is_due = |pass| is_first && self.shelf.pass(size) == pass;
         let (is_colouring_due, is_showing_due) = (is_due(Pass::Colouring), is_due(Pass::Coloured));
-        self.shelf
-            .begin(size, view, divisor, self.frames + 1, &self.world);
+        self.shelf.begin(size, view, divisor, self.frames + 1);
         self.reserve_handing_over(target, work);
 
         let (handing_over_ms, resolve_ms) = self.ending_ms(&view, divisor, target);
@@ -247,7 +246,7 @@ impl Renderer {
             predicted,
             ..
         } = work;
-        let picture = self.shelf.get_or_make(size, &self.world);
+        let picture = self.shelf.get_or_make(size);
         let mut studio = Studio {
             exec: *exec,
             method: self.method,
@@ -273,7 +272,7 @@ impl Renderer {
                 return false;
             }
         }
-        self.shelf.publish(size, &self.world);
+        self.shelf.publish(size);
         allowance.note_image();
         true
     }
@@ -350,7 +349,7 @@ impl Renderer {
             }
             GeometryChange::Replaced => {
                 self.culler = Culler::new(&self.world.clusters);
-                self.shelf.replace_world(&self.world);
+                self.shelf.replace_world();
                 self.load = ImageLoad::guess(&self.world);
             }
         }
@@ -374,31 +373,17 @@ impl Renderer {
         if !self.method.is_progressive() || self.shelf.in_hand().is_some() {
             return None;
         }
-        let since = work.allowance.elapsed_ms();
-        let drawing_ms = self.refine_shown(target, work);
-        let drawing = drawing_ms.unwrap_or(0.0);
-        work.stages.refine += work.allowance.elapsed_ms() - since - drawing;
-        work.stages.resolve += drawing;
-        drawing_ms
-    }
-
-    fn refine_shown(&mut self, target: Option<&Target<'_>>, work: &mut Work<'_>) -> Option<f64> {
-        let Work {
-            exec,
-            allowance,
-            predicted,
-            ..
-        } = work;
         let picture = self.shelf.shown_mut()?;
         let mut easel = Easel {
-            exec: *exec,
+            exec: work.exec,
             method: self.method,
             world: &self.world,
             costs: &mut self.costs,
-            predicted,
+            stages: &mut work.stages,
+            predicted: &mut work.predicted,
             target,
         };
-        picture.refine(&mut easel, allowance)
+        picture.refine(&mut easel, &mut work.allowance)
     }
 
     /// Hands the image shown over; returns the number of pixels written.

@@ -5,7 +5,7 @@
 
 use super::picture::{Pass, Picture};
 use crate::backend::Backend;
-use crate::scene::{View, World};
+use crate::scene::View;
 
 /// Which picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,10 +26,10 @@ pub(super) struct Shelf {
 }
 
 impl Shelf {
-    pub(super) fn new(backend: Box<dyn Backend>, world: &World) -> Self {
+    pub(super) fn new(backend: Box<dyn Backend>) -> Self {
         Self {
             can_reduce: backend.sibling().is_some(),
-            full: Picture::new(backend, world),
+            full: Picture::new(backend),
             reduced: None,
             shown: None,
         }
@@ -53,13 +53,13 @@ impl Shelf {
     }
 
     /// The picture of that size, made if need be; the one at full resolution where there can be no other.
-    pub(super) fn get_or_make(&mut self, size: Size, world: &World) -> &mut Picture {
+    pub(super) fn get_or_make(&mut self, size: Size) -> &mut Picture {
         if size == Size::Full {
             return &mut self.full;
         }
         if self.reduced.is_none() {
             let backend = self.full.backend.sibling();
-            self.reduced = backend.map(|backend| Picture::new(backend, world));
+            self.reduced = backend.map(Picture::new);
         }
         self.reduced.as_mut().unwrap_or(&mut self.full)
     }
@@ -79,9 +79,8 @@ impl Shelf {
     }
 
     /// Takes note that the world is another one.
-    pub(super) fn replace_world(&mut self, world: &World) {
-        self.pictures()
-            .for_each(|picture| picture.replace_world(world));
+    pub(super) fn replace_world(&mut self) {
+        self.pictures().for_each(Picture::replace_world);
     }
 
     /// Gives the image in hand of that size up.
@@ -93,9 +92,11 @@ impl Shelf {
         picture.into_iter().for_each(Picture::forget);
     }
 
-    /// Forgets all images; there is none to be shown.
+    /// Forgets all images, and what was found out about triangles; there is none to be shown.
     pub(super) fn forget(&mut self) {
         self.forget_owners();
+        self.pictures()
+            .for_each(|picture| picture.refinement.forget());
         self.shown = None;
     }
 
@@ -119,15 +120,8 @@ impl Shelf {
     }
 
     /// Begins an image, or goes on with it. The one shown is lost if it was in the same picture and of another size.
-    pub(super) fn begin(
-        &mut self,
-        size: Size,
-        view: View,
-        divisor: u32,
-        frame: u64,
-        world: &World,
-    ) {
-        let picture = self.get_or_make(size, world);
+    pub(super) fn begin(&mut self, size: Size, view: View, divisor: u32, frame: u64) {
+        let picture = self.get_or_make(size);
         let is_lost = picture.size() != Some([view.width, view.height]);
         picture.begin(view, divisor, frame);
         if is_lost && self.shown == Some(size) {
@@ -136,8 +130,8 @@ impl Shelf {
     }
 
     /// Shows the picture of that size, whose first image has got its colours.
-    pub(super) fn publish(&mut self, size: Size, world: &World) {
-        self.get_or_make(size, world).publish();
+    pub(super) fn publish(&mut self, size: Size) {
+        self.get_or_make(size).publish();
         self.shown = Some(size);
     }
 

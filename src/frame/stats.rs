@@ -56,7 +56,7 @@ pub struct StageTimes {
     pub cull: f64,
     /// Illuminating vertices.
     pub shade: f64,
-    /// Highlight sign tests, and collecting candidates for refinement.
+    /// Collecting candidates for refinement: highlight sign tests, first guesses of errors, and ranks.
     pub classify: f64,
     /// Transforming, binning and rasterizing: who owns which pixel.
     pub raster: f64,
@@ -162,7 +162,8 @@ pub struct FrameStats {
     /// What time had to say about the frame: enough to [replay](Budget::Replay) it.
     pub record: FrameRecord,
     /// Estimated root mean square difference from per-pixel Phong shading, in 8-bit codes over covered pixels; 0
-    /// for [`Method::Phong`](super::Method::Phong). NaN for flat and Gouraud shading, where nothing is estimated.
+    /// for [`Method::Phong`](super::Method::Phong). NaN for flat and Gouraud shading, where nothing is estimated, and while nothing is known yet. Where the budget ended before
+    /// all visible triangles were looked at, over those that were.
     pub estimated_error: f64,
     /// Triangles of the scene; those of two-sided materials count twice, as fronts and as backs.
     pub triangles: u64,
@@ -172,12 +173,12 @@ pub struct FrameStats {
     pub triangles_visible: u64,
     /// Pixels that some triangle owns.
     pub covered_pixels: u64,
-    /// Potentially highlighted triangles: those that pass the paper's H1 and H2 tests for some light, in all clusters that
-    /// were not culled. Not counted by methods that draw one image and are done.
+    /// Potentially highlighted triangles: those that pass the paper's H1 and H2 tests for some light. Only triangles that
+    /// own a pixel are tested, so far as the budget went; none by methods that draw one image and are done.
     pub pht: u64,
-    /// Those of them that own at least one pixel.
+    /// The same.
     pub pht_visible: u64,
-    /// Those of the visible ones that have been refined so far (subdivided or shaded per pixel).
+    /// Those of them that have been refined so far (subdivided or shaded per pixel).
     pub refined: u64,
     /// Triangles subdivided so far.
     pub triangles_subdivided: u64,

@@ -24,64 +24,94 @@ use crate::scene::{Eye, ShadingLight, World};
 use crate::simd::{Level, Simd, dispatch};
 use fearless_simd::prelude::*;
 
-/// Lights whose bits share a word.
-const WORD_LIGHTS: usize = 32;
+/// Lights whose bits share a word: as many as there is room for with three bits each.
+const WORD_LIGHTS: usize = 10;
 
-/// The sign bits of a scene's vertices, one word per 32 lights and plane.
+/// Where in a word each test's bits begin, light by light.
+const H1: usize = 0;
+const H2: usize = WORD_LIGHTS;
+const BACK: usize = 2 * WORD_LIGHTS;
+
+/// The bits of one test.
+const ONE_TEST: u32 = (1 << WORD_LIGHTS) - 1;
+
+/// The sign bits of some vertices, by their places in the list they were computed for.
 #[derive(Clone, Debug, Default)]
 pub struct SignBits {
-    vertices: usize,
-    /// One plane of bits after the other for each word of lights.
-    words: Vec<[Vec<u32>; 3]>,
+    /// For each [`WORD_LIGHTS`] lights, a word for each vertex.
+    words: Vec<Vec<u32>>,
 }
 
-/// Where in [`SignBits::words`] each test's bits are.
-const H1: usize = 0;
-const H2: usize = 1;
-const BACK: usize = 2;
-
 impl SignBits {
-    /// Makes room for a world; bits are undefined until computed. Allocates only when the world has grown.
-    pub fn resize(&mut self, world: &World) {
-        self.vertices = world.positions.len();
-        let lights = world.lights.len().min(MAX_LIGHTS);
+    /// Makes room for the bits of `vertices` vertices under `lights` lights.
+    pub fn reserve(&mut self, vertices: usize, lights: usize) {
+        let words = lights.min(MAX_LIGHTS).div_ceil(WORD_LIGHTS);
         self.words
-            .resize_with(lights.div_ceil(WORD_LIGHTS), Default::default);
-        for plane in self.words.iter_mut().flatten() {
-            plane.resize(self.vertices, 0);
+            .resize_with(words.max(self.words.len()), Default::default);
+        for words in &mut self.words {
+            let room = vertices.next_multiple_of(MAX_LANES);
+            words.reserve(room.saturating_sub(words.len()));
         }
     }
 
-    /// Lights for which both tests differ among the three vertices: the triangle is a potentially highlighted one.
+    /// Takes as many vertices under as many lights. Allocates only when there were never so many.
+    fn resize(&mut self, vertices: usize, lights: usize) {
+        let words = lights.min(MAX_LIGHTS).div_ceil(WORD_LIGHTS);
+        self.words.resize_with(words, Default::default);
+        for words in &mut self.words {
+            // The last vector is stored whole.
+            words.resize(vertices.next_multiple_of(MAX_LANES), 0);
+        }
+    }
+
+    /// Lights for which both tests differ among three vertices, given by their places in the list: the triangle is a
+    /// potentially highlighted one.
     ///
     /// # Panics
-    /// When a vertex is not one of the world's.
+    /// When there is no such place.
+    #[inline]
     #[must_use]
-    pub fn pht_lights(&self, triangle: [u32; 3]) -> LightMask {
+    pub fn pht_lights(&self, places: [usize; 3]) -> LightMask {
         let mut mask = 0;
-        for (index, planes) in self.words.iter().enumerate() {
-            let [h1, h2, back] = [H1, H2, BACK].map(|plane| {
-                let [a, b, c] = triangle.map(|vertex| planes[plane][vertex as usize]);
-                (a & b & c, a | b | c)
-            });
-            let passes = (h1.1 & !h1.0) & (h2.1 & !h2.0) & !back.0;
-            mask |= u128::from(passes) << (index * WORD_LIGHTS);
+        for (index, words) in self.words.iter().enumerate() {
+            mask |= u128::from(passes(words, places)) << (index * WORD_LIGHTS);
         }
         LightMask(mask)
     }
+
+    /// Whether there is any such light.
+    ///
+    /// # Panics
+    /// When there is no such place.
+    #[inline]
+    #[must_use]
+    pub fn is_pht(&self, places: [usize; 3]) -> bool {
+        self.words.iter().any(|words| passes(words, places) != 0)
+    }
 }
 
-/// Computes the bits of vertices given by index.
+/// For which lights of a word both tests differ among three vertices.
+#[inline]
+fn passes(words: &[u32], places: [usize; 3]) -> u32 {
+    let [a, b, c] = places.map(|place| words[place]);
+    let all = a & b & c;
+    let differ = (a | b | c) & !all;
+    (differ >> H1) & (differ >> H2) & !(all >> BACK) & ONE_TEST
+}
+
+/// Computes the bits of vertices given by index: `bits` then holds those of the vertices in this list, in its order.
 ///
 /// # Panics
-/// When a vertex is not one of the world's, or `bits` was not [resized](SignBits::resize) for it.
+/// When a vertex is not one of the world's.
 pub fn compute_signs(level: Level, world: &World, eye: Eye, vertices: &[u32], bits: &mut SignBits) {
+    bits.resize(vertices.len(), world.lights.len());
     dispatch!(level, simd => signs_of_list(simd, world, eye, vertices, bits));
 }
 
 #[inline(always)]
 fn signs_of_list<S: Simd>(simd: S, world: &World, eye: Eye, vertices: &[u32], bits: &mut SignBits) {
-    for group in vertices.chunks(S::f32s::LEN) {
+    let lanes = S::f32s::LEN;
+    for (group, first) in vertices.chunks(lanes).zip((0..).step_by(lanes)) {
         let mut places = [group[0] as usize; MAX_LANES];
         for (place, &vertex) in places.iter_mut().zip(group) {
             *place = vertex as usize;
@@ -92,20 +122,14 @@ fn signs_of_list<S: Simd>(simd: S, world: &World, eye: Eye, vertices: &[u32], bi
             Eye::Point(eye) => towards(simd, eye, point),
             Eye::Direction(direction) => splat3(simd, direction),
         };
-        for (planes, lights) in bits.words.iter_mut().zip(world.lights.chunks(WORD_LIGHTS)) {
-            let words = signs_of_lights(simd, lights, point, normal, to_viewer);
-            for (plane, word) in planes.iter_mut().zip(words) {
-                let mut values = [0; MAX_LANES];
-                word.store_slice(&mut values[..S::u32s::LEN]);
-                for (&vertex, &value) in group.iter().zip(&values) {
-                    plane[vertex as usize] = value;
-                }
-            }
+        for (words, lights) in bits.words.iter_mut().zip(world.lights.chunks(WORD_LIGHTS)) {
+            let word = signs_of_lights(simd, lights, point, normal, to_viewer);
+            word.store_slice(&mut words[first..first + lanes]);
         }
     }
 }
 
-/// The three words of bits of up to 32 lights, the first light in the lowest bit.
+/// The word of up to [`WORD_LIGHTS`] lights.
 #[inline(always)]
 fn signs_of_lights<S: Simd>(
     simd: S,
@@ -113,10 +137,10 @@ fn signs_of_lights<S: Simd>(
     point: [S::f32s; 3],
     n: [S::f32s; 3],
     v: [S::f32s; 3],
-) -> [S::u32s; 3] {
+) -> S::u32s {
     let zero = S::f32s::splat(simd, 0.0);
     let none = S::u32s::splat(simd, 0);
-    let mut words = [none; 3];
+    let mut word = none;
     let a = dot::<S>(v, n);
     let (a_signed_square, v_square) = (a * a.abs(), dot::<S>(v, v));
     for (index, light) in lights.iter().enumerate() {
@@ -136,12 +160,12 @@ fn signs_of_lights<S: Simd>(
             (b * b.abs() * v_square).simd_gt(a_signed_square * dot::<S>(l, l)),
             a.simd_lt(zero) & b.simd_lt(zero),
         ];
-        let bit = S::u32s::splat(simd, 1 << index);
-        for (word, test) in words.iter_mut().zip(tests) {
-            *word |= test.select(bit, none);
+        for (test, first) in tests.into_iter().zip([H1, H2, BACK]) {
+            let bit = S::u32s::splat(simd, 1 << (first + index));
+            word |= test.select(bit, none);
         }
     }
-    words
+    word
 }
 
 /// Rounded term by term, so that no level differs.
@@ -232,7 +256,6 @@ mod tests {
             ] {
                 for level in SimdLevel::available() {
                     let mut bits = SignBits::default();
-                    bits.resize(&world);
                     compute_signs(
                         level.token().expect("available"),
                         &world,
@@ -240,21 +263,18 @@ mod tests {
                         &list,
                         &mut bits,
                     );
-                    for &v in &list {
+                    for (place, &v) in list.iter().enumerate() {
                         for (index, light) in world.lights.iter().enumerate() {
                             let point = vector(world.positions.get(v as usize));
                             let normal = vector(world.normals.get(v as usize));
                             let (values, back) = by_angles(point, normal, &eye, light);
-                            let bit = |plane: usize| {
-                                bits.words[index / 32][plane][v as usize] >> (index % 32) & 1 == 1
+                            let bit = |test: usize| {
+                                let word = bits.words[index / WORD_LIGHTS][place];
+                                word >> (test + index % WORD_LIGHTS) & 1 == 1
                             };
-                            for plane in [H1, H2] {
-                                if values[plane].abs() > 1e-5 {
-                                    assert_eq!(
-                                        bit(plane),
-                                        values[plane] > 0.0,
-                                        "{level} {v} {index}"
-                                    );
+                            for (value, test) in values.into_iter().zip([H1, H2]) {
+                                if value.abs() > 1e-5 {
+                                    assert_eq!(bit(test), value > 0.0, "{level} {v} {index}");
                                 }
                             }
                             assert_eq!(bit(BACK), back, "{level} {v} {index}");
@@ -287,7 +307,6 @@ mod tests {
         };
         let mut bits = SignBits::default();
         let level = SimdLevel::detect().token().expect("detected");
-        bits.resize(&world);
         compute_signs(
             level,
             &world,

@@ -94,9 +94,9 @@ pub struct MaterialCounts {
 /// image and are done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PhtCounts {
-    /// All that were not culled.
+    /// All that were tested: only those that own a pixel are.
     pub total: u64,
-    /// Those that own a pixel.
+    /// The same.
     pub visible: u64,
     /// Those of the visible ones that have been subdivided or shaded per pixel.
     pub refined: u64,

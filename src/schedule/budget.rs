@@ -26,7 +26,8 @@ use crate::clock::Clock;
 /// whole, late if need be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
-    /// Wall-clock milliseconds from the call of `render` to its return, by the engine's clock. Zero buys a first image at full resolution,
+    /// Wall-clock milliseconds from the call of `render` to its return, by the engine's clock. Of an image begun under such a budget,
+    /// what refinement found out in the images before decides what is looked at first; under any other budget it has no influence. Zero buys a first image at full resolution,
     /// however long that takes, and no refinement.
     Millis(f64),
     /// Work units: nominal nanoseconds of refinement (see [`cost`](super::cost)). The result is the same, bit for
@@ -61,6 +62,7 @@ pub struct Allowance<'a> {
     ms_per_unit: f64,
     is_first_image_bounded: bool,
     spent_units: u64,
+    free_ns: u64,
     is_over: bool,
     /// What has been done so far.
     done: FrameRecord,
@@ -84,8 +86,15 @@ impl<'a> Allowance<'a> {
             ms_per_unit: 1e-6,
             is_first_image_bounded: true,
             spent_units: 0,
+            free_ns: 0,
             is_over: false,
-            done: FrameRecord::default(),
+            done: FrameRecord {
+                is_timed: match budget {
+                    Budget::Replay(record) => record.is_timed,
+                    _ => matches!(budget, Budget::Millis(_)),
+                },
+                ..FrameRecord::default()
+            },
         }
     }
 
@@ -187,8 +196,37 @@ impl<'a> Allowance<'a> {
         !self.is_over
     }
 
+    /// Admits work of about `nominal_ns` nanoseconds that costs no work units and is no step, or ends the frame's refinement like
+    /// [`admit`](Self::admit): only a wall-clock budget, or a token, can refuse it.
+    #[must_use]
+    pub fn admit_free(&mut self, nominal_ns: u64) -> bool {
+        let is_bounded = self.has_deadline() || self.is_cancelled();
+        self.is_over = self.is_over || is_bounded && !self.has_room_for(nominal_ns);
+        !self.is_over
+    }
+
+    /// Whether the budget is one of wall-clock time.
+    #[must_use]
+    pub fn has_deadline(&self) -> bool {
+        matches!(self.budget, Budget::Millis(_))
+    }
+
+    /// Whether the frame, or the one that is replayed, has a wall-clock budget.
+    #[must_use]
+    pub fn is_timed(&self) -> bool {
+        match self.budget {
+            Budget::Replay(record) => record.is_timed,
+            _ => self.has_deadline(),
+        }
+    }
+
+    /// Whether refinement is to stop: a replay has been stopped already, when it was recorded.
+    fn is_cancelled(&self) -> bool {
+        self.cancel.is_cancelled() && !matches!(self.budget, Budget::Replay(_))
+    }
+
     fn has_room_for(&self, units: u64) -> bool {
-        if self.cancel.is_cancelled() && !matches!(self.budget, Budget::Replay(_)) {
+        if self.is_cancelled() {
             return false;
         }
         match self.budget {
@@ -224,6 +262,17 @@ impl<'a> Allowance<'a> {
     /// Books `units` of finished work.
     pub fn spend(&mut self, units: u64) {
         self.spent_units = self.spent_units.saturating_add(units);
+    }
+
+    /// Takes note of `nominal_ns` of finished work that costs no units.
+    pub fn note_free(&mut self, nominal_ns: u64) {
+        self.free_ns = self.free_ns.saturating_add(nominal_ns);
+    }
+
+    /// Nominal nanoseconds of all work so far, work units or not.
+    #[must_use]
+    pub fn nominal_ns(&self) -> u64 {
+        self.spent_units.saturating_add(self.free_ns)
     }
 
     /// Work units booked so far.
@@ -287,6 +336,19 @@ mod tests {
         assert!(!allowance.admit(101));
         assert!(!allowance.admit(1));
         assert_eq!(allowance.record().steps, 0);
+    }
+
+    #[test]
+    fn what_is_free_is_refused_by_the_clock_only() {
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
+        let mut allowance = start(Budget::Work(0), &clock, &cancel);
+        assert!(allowance.admit_free(1_000_000));
+        allowance = start(Budget::from_millis(1.0), &clock, &cancel);
+        assert!(allowance.admit_free(1_000_000));
+        assert_eq!((allowance.record().steps, allowance.spent_units()), (0, 0));
+        clock.advance_ms(0.5);
+        assert!(!allowance.admit_free(500_001));
+        assert!(!allowance.admit(0), "the first refusal is the last word");
     }
 
     #[test]

@@ -35,6 +35,10 @@ pub const PHONG_PIXEL_LIGHT_NS: f32 = 0.84;
 pub const BOUNDS_NS: f32 = 190.0;
 /// See [`BOUNDS_NS`].
 pub const BOUNDS_LIGHT_NS: f32 = 153.0;
+/// Making a visible triangle a candidate: a part for each triangle, and one for each light. They cost no work units.
+pub const COLLECT_NS: f32 = 36.0;
+/// See [`COLLECT_NS`].
+pub const COLLECT_LIGHT_NS: f32 = 0.7;
 /// Copying a pixel into the caller's frame, until the engine has measured it: see [`LearnedRate`](super::LearnedRate).
 pub const PRESENT_PIXEL_NS: f32 = 0.4;
 
@@ -111,6 +115,12 @@ pub fn drawing(triangles: f32, pixels: f32) -> f32 {
 #[must_use]
 pub fn bounds(lights: usize) -> f32 {
     BOUNDS_NS + BOUNDS_LIGHT_NS * lights as f32
+}
+
+/// Making `triangles` visible triangles candidates under `lights` lights, without samples at their centroids.
+#[must_use]
+pub fn collecting(triangles: f32, lights: usize) -> f32 {
+    triangles * (COLLECT_NS + COLLECT_LIGHT_NS * lights as f32)
 }
 
 /// What leaving a light out of the shading of `pixels` pixels saves.

@@ -1,14 +1,10 @@
-//! Candidates by rank, in buckets.
-//!
-//! A candidate's rank is benefit per nominal cost. Ranks are sorted into buckets of a quarter of an octave over 64
-//! octaves; within a bucket the first to come is the first to go. That is as good as an exact order (the ranks are
-//! estimates) and makes pushing and popping a few instructions each, whatever the number of candidates.
+//! Candidates by rank, in buckets: within a bucket the first to come is the first to go. That makes pushing and popping
+//! a few instructions each, whatever the number of candidates.
 //!
 //! Order depends only on the sequence of calls, never on addresses or time.
 
-const OCTAVES: i32 = 64;
-const BUCKETS_PER_OCTAVE: i32 = 4;
-const BUCKETS: usize = (OCTAVES * BUCKETS_PER_OCTAVE) as usize;
+use super::Rank;
+use super::rank::{BUCKETS, RankSet};
 
 /// No node.
 const NONE: u32 = u32::MAX;
@@ -36,8 +32,8 @@ pub struct RankedQueue<T> {
     /// The first free node.
     free: u32,
     buckets: [Bucket; BUCKETS],
-    /// A bit for each bucket that is not empty.
-    occupied: [u64; BUCKETS / 64],
+    /// Ranks of the buckets that are not empty.
+    occupied: RankSet,
     len: usize,
 }
 
@@ -51,7 +47,7 @@ impl<T> Default for RankedQueue<T> {
             nodes: Vec::new(),
             free: NONE,
             buckets: [empty; BUCKETS],
-            occupied: [0; BUCKETS / 64],
+            occupied: RankSet::default(),
             len: 0,
         }
     }
@@ -62,7 +58,7 @@ impl<T: Copy> RankedQueue<T> {
     pub fn clear(&mut self) {
         self.nodes.clear();
         self.free = NONE;
-        self.occupied = [0; BUCKETS / 64];
+        self.occupied = RankSet::default();
         self.len = 0;
     }
 
@@ -85,12 +81,11 @@ impl<T: Copy> RankedQueue<T> {
 
     /// Adds a candidate. Ranks that are zero, negative or NaN go last, infinite ones first.
     pub fn push(&mut self, rank: f32, candidate: T) {
-        let index = bucket_of(rank);
+        let rank = Rank::new(rank);
         let node = self.new_node(candidate);
-        let (word, bit) = (index / 64, 1 << (index % 64));
-        let bucket = &mut self.buckets[index];
-        if self.occupied[word] & bit == 0 {
-            self.occupied[word] |= bit;
+        let bucket = &mut self.buckets[rank.bucket()];
+        if !self.occupied.contains(rank) {
+            self.occupied.insert(rank);
             bucket.first = node;
         } else {
             self.nodes[bucket.last as usize].next = node;
@@ -99,15 +94,20 @@ impl<T: Copy> RankedQueue<T> {
         self.len += 1;
     }
 
+    /// The rank of the best candidate.
+    #[must_use]
+    pub fn best(&self) -> Option<Rank> {
+        self.occupied.best()
+    }
+
     /// Removes the best candidate; among equals the one that came first.
     pub fn pop(&mut self) -> Option<T> {
-        let word = self.occupied.iter().rposition(|&bits| bits != 0)?;
-        let index = word * 64 + 63 - self.occupied[word].leading_zeros() as usize;
-        let bucket = &mut self.buckets[index];
+        let rank = self.best()?;
+        let bucket = &mut self.buckets[rank.bucket()];
         let taken = bucket.first;
         let Node { candidate, next } = self.nodes[taken as usize];
         if taken == bucket.last {
-            self.occupied[word] &= !(1 << (index % 64));
+            self.occupied.remove(rank);
         } else {
             bucket.first = next;
         }
@@ -132,16 +132,6 @@ impl<T: Copy> RankedQueue<T> {
         self.nodes[index as usize] = node;
         index
     }
-}
-
-/// A quarter-octave scale read off the exponent and the two top mantissa bits of the rank.
-fn bucket_of(rank: f32) -> usize {
-    if rank.is_nan() || rank <= 0.0 {
-        return 0;
-    }
-    let quarter_octaves = (rank.to_bits() >> 21) as i32;
-    let of_one = (1.0_f32.to_bits() >> 21) as i32;
-    (quarter_octaves - of_one + BUCKETS as i32 / 2).clamp(0, BUCKETS as i32 - 1) as usize
 }
 
 #[cfg(test)]

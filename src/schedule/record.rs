@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameRecord {
+    /// Whether it had a wall-clock budget.
+    pub is_timed: bool,
     /// Divisor of the image's sides that a new first image was to be drawn at.
     pub divisor: u32,
     /// First images completed in the frame.
@@ -21,6 +23,7 @@ impl Default for FrameRecord {
     /// A frame in which nothing was done.
     fn default() -> Self {
         Self {
+            is_timed: false,
             divisor: 1,
             images: 0,
             is_image_begun: false,

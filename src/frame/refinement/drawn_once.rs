@@ -79,9 +79,9 @@ impl Refinement {
 
     /// How many triangles there are to draw, and their pixels, hidden ones included.
     pub(in crate::frame) fn drawing_load(&self) -> (u64, u64) {
-        let whole = self.roots.len().saturating_sub(self.forest.planted_roots());
+        let whole = self.visible.saturating_sub(self.forest.planted_roots());
         let triangles = (whole + self.forest.open_leaves()) as u64;
-        (triangles, self.pixels)
+        (triangles, self.pixels_to_draw)
     }
 
     /// Whether an open leaf of an image that is drawn once is not good enough.

@@ -72,16 +72,25 @@ pub(in crate::frame) fn for_each_leaf(
     mut f: impl FnMut(&Leaf),
 ) {
     if method.is_progressive() {
-        return refinement.for_each_leaf(world, base.colours(), f);
+        let visible = backend.visible_triangles();
+        let rest = visible.get(refinement.roots.len()..).unwrap_or_default();
+        refinement.for_each_leaf(world, base.colours(), &mut f);
+        // Those that have not been collected are as they were drawn.
+        for &triangle in rest {
+            let colours = corner_colours(world, base.colours(), triangle);
+            let pixels = backend.visible_pixels(triangle);
+            f(&Leaf::root(triangle, colours, pixels));
+        }
+        return;
     }
     for &triangle in backend.visible_triangles() {
         let colours = match method {
-            Method::Phong => [[0.0; 3]; 3],
+            method if method.shades_first_image_per_pixel() => [[0.0; 3]; 3],
             Method::Flat => [base.colours().get(triangle as usize); 3],
             _ => corner_colours(world, base.colours(), triangle),
         };
         let mut leaf = Leaf::root(triangle, colours, backend.visible_pixels(triangle));
-        if method == Method::Phong {
+        if method.shades_first_image_per_pixel() {
             leaf.kind = LeafKind::PerPixel;
         }
         f(&leaf);
@@ -100,7 +109,8 @@ impl Refinement {
                 ..Leaf::root(root.triangle, colours, root.pixels)
             };
             if root.progress == Progress::Done {
-                self.shade(&mut leaf, root, root.last_paint);
+                let last_paint = self.root_shading(root).map_or(0, |s| s.last_paint);
+                self.shade(&mut leaf, root, last_paint);
             }
             f(&leaf);
         }
@@ -162,7 +172,7 @@ impl Refinement {
 
     /// Makes it a leaf that is shaded as its root is shaded.
     fn shade(&self, leaf: &mut Leaf, root: &Root, last_paint: u32) {
-        match root.shading {
+        match self.root_shading(root).map(|s| s.shading) {
             Some(Shading::PerPixel(..)) => {
                 leaf.kind = LeafKind::PerPixel;
                 leaf.is_painted = self.is_painted(last_paint);

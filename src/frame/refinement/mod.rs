@@ -1,8 +1,9 @@
 //! Refinement: what could be done next, what it is worth, and doing it piece by piece.
 //!
-//! Work comes in two kinds of pieces, each about [`PIECE_UNITS`] long (painting by several threads longer while the deadline
+//! Work comes in three kinds of pieces, each about [`PIECE_UNITS`] long (those shared by several threads longer while the deadline
 //! is far away), and none is begun that the budget does not admit:
 //!
+//! * A **collecting** piece makes the next visible triangles of a new image candidates. Planning begins when all are.
 //! * A **planning** piece takes the best candidates off the queue. A triangle not looked at yet becomes the root of a
 //!   subdivision, its error estimated from samples; a leaf is split further, or is to be shaded per pixel, whichever
 //!   takes away more error per nominal cost. All new vertices of the piece are illuminated together. What comes out is
@@ -15,10 +16,13 @@
 //! Plans depend on nominal costs and estimates only, and patches are painted in list order until the budget ends, so
 //! that a budget in work units gives the same image for any number of threads.
 
+mod collecting;
 mod drawn_once;
 mod leaves;
+mod memory;
 mod painting;
 mod parts;
+mod places;
 mod planning;
 mod ranking;
 
@@ -31,11 +35,14 @@ use crate::parallel::Exec;
 use crate::refine::estimate::{SAMPLES_AT_ONCE, Samples};
 use crate::refine::{FIRST_LEAVES, Forest, LeafId, SplitOutcome};
 use crate::scene::{View, World};
-use crate::schedule::{Allowance, Kind, RankedQueue};
+use crate::schedule::{Allowance, Kind, RankedList, RankedQueue};
+use collecting::Collector;
 pub(super) use drawn_once::DrawnLeaves;
 pub(super) use leaves::for_each_leaf;
 pub use leaves::{Leaf, LeafKind};
+use memory::Memory;
 use parts::Part;
+use places::Places;
 use std::collections::VecDeque;
 
 /// Nominal nanoseconds of a piece.
@@ -44,8 +51,11 @@ const PIECE_UNITS: u64 = 50_000;
 /// Patches, leaves or candidates in a piece, as a rule at most.
 const ENTRIES_AT_ONCE: usize = 512;
 
-/// A triangle of fewer pixels is ranked by its corners alone: a sample would cost as much as shading some of them.
-const PIXELS_FOR_CENTROID: u32 = 8;
+/// Triangles that there is room for, from the start, to know how they are shaded.
+const FIRST_SHADINGS: usize = 1 << 11;
+
+/// No place in [`Refinement::shadings`].
+const NONE: u32 = u32::MAX;
 
 /// What the stages of refinement work on.
 pub(super) struct Stage<'a> {
@@ -67,23 +77,42 @@ enum Candidate {
     Part(u32),
 }
 
-/// A visible triangle.
+/// A visible triangle. There may be a million, few of which are ever looked at: what is known of those only is kept elsewhere.
 #[derive(Clone, Copy, Debug)]
 struct Root {
     triangle: u32,
     pixels: u32,
-    /// Mean squared error, guessed before anything was looked at.
+    /// Mean squared error, guessed or remembered, before anything was looked at.
     prior: f32,
+    /// Where in [`Refinement::shadings`] it is said how its pixels are shaded, once that has been asked; or [`NONE`].
+    shading: u32,
     is_pht: bool,
     progress: Progress,
     /// Subdivided.
     is_split: bool,
     /// Subdivided, or shaded per pixel in part or as a whole.
     is_refined: bool,
-    /// How its pixels are shaded, once that has been asked.
-    shading: Option<Shading>,
-    /// Number of the last patch that shades it as a whole; see [`Refinement::enqueued`].
-    last_paint: u32,
+}
+
+impl Root {
+    /// One of which only this is known.
+    fn new(triangle: u32, pixels: u32) -> Self {
+        Self {
+            triangle,
+            pixels,
+            prior: 0.0,
+            shading: NONE,
+            is_pht: false,
+            progress: Progress::Waiting,
+            is_split: false,
+            is_refined: false,
+        }
+    }
+
+    /// Its share of the expected sum of squared errors while it has not been looked at.
+    fn mass(&self) -> f64 {
+        f64::from(self.pixels) * f64::from(self.prior)
+    }
 }
 
 /// How far a root has come.
@@ -104,6 +133,14 @@ enum Shading {
     Proved,
     /// These, plus the rest, interpolated between the triangle's corners.
     PerPixel(ActiveLights, [[f32; 3]; 3]),
+}
+
+/// What is known of a root that is shaded per pixel, or that bounds have been found for.
+#[derive(Clone, Copy, Debug)]
+struct RootShading {
+    shading: Shading,
+    /// Number of the last patch that shades it as a whole; see [`Refinement::enqueued`].
+    last_paint: u32,
 }
 
 /// Who waits for a patch to be painted.
@@ -138,10 +175,19 @@ struct Progressing {
 #[derive(Debug, Default)]
 pub(super) struct Refinement {
     forest: Forest,
+    /// Candidates, apart from the roots that nobody has asked for yet.
     queue: RankedQueue<Candidate>,
+    ranked_roots: RankedList,
+    /// How many triangles are visible: `roots` once all of them are collected.
+    visible: usize,
+    /// In the order of their triangles.
     roots: Vec<Root>,
-    /// Place of a triangle in `roots`, for visible ones.
-    root_of_triangle: Vec<u32>,
+    places: Places,
+    memory: Memory,
+    /// Whether what is remembered takes the place of guesses.
+    remembers: bool,
+    shadings: Vec<RootShading>,
+    collectors: Vec<Collector>,
     paints: VecDeque<Paint>,
     /// How many patches were put on the list so far, which numbers them from 1.
     enqueued: u32,
@@ -152,6 +198,8 @@ pub(super) struct Refinement {
     by_area: bool,
     /// There is no painting: everything is drawn after it has been refined. See [`drawn_once`].
     is_drawn_once: bool,
+    /// Pixels of all visible triangles of an image that is drawn once.
+    pixels_to_draw: u64,
     /// Splits committed for the current image.
     commits: u64,
     /// Visible pixels of all roots.
@@ -175,6 +223,8 @@ pub(super) struct Refinement {
 /// What refinement has come to for the current image.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counters {
+    phts: u64,
+    matte: u64,
     refined_phts: u64,
     subdivided: u64,
     phong_pixels: u64,
@@ -186,7 +236,10 @@ impl Refinement {
     /// Forgets everything and keeps the memory.
     pub(super) fn clear(&mut self) {
         self.queue.clear();
+        self.ranked_roots.clear();
+        self.visible = 0;
         self.roots.clear();
+        self.shadings.clear();
         self.paints.clear();
         self.enqueued = 0;
         self.progressing.clear();
@@ -194,9 +247,20 @@ impl Refinement {
         self.samples.clear();
         self.ranked_parts = 0;
         self.commits = 0;
+        self.pixels_to_draw = 0;
         self.pixels = 0;
         self.error_mass = 0.0;
         self.counters = Counters::default();
+    }
+
+    /// Forgets what was found out about triangles in earlier images.
+    pub(super) fn forget(&mut self) {
+        self.memory.forget();
+    }
+
+    /// Whether the image that begins next remembers what was found out in those before.
+    pub(super) fn set_remembering(&mut self, remembers: bool) {
+        self.remembers = remembers;
     }
 
     /// Makes room, once for an image size, for what is on the lists as a rule at most while the view moves.
@@ -206,6 +270,7 @@ impl Refinement {
         self.paints.reserve(ENTRIES_AT_ONCE + pixels / 256);
         self.samples.reserve(SAMPLES_AT_ONCE);
         self.queue.reserve(ENTRIES_AT_ONCE);
+        self.shadings.reserve(FIRST_SHADINGS);
         self.progressing.reserve(FIRST_LEAVES);
         self.piece.clear();
         self.piece.reserve(ENTRIES_AT_ONCE);
@@ -220,11 +285,15 @@ impl Refinement {
 
     /// Whether there is nothing left to refine.
     pub(super) fn is_finished(&self) -> bool {
-        self.queue.is_empty() && self.paints.is_empty()
+        !self.is_collecting()
+            && self.ranked_roots.best().is_none()
+            && self.queue.is_empty()
+            && self.paints.is_empty()
     }
 
-    /// Makes every visible triangle of a new image a candidate.
-    pub(super) fn collect_candidates(
+    /// Begins with a new image, of which nothing is known yet: its visible triangles are still to be
+    /// [collected](collecting).
+    pub(super) fn begin(
         &mut self,
         exec: Exec,
         method: Method,
@@ -236,74 +305,31 @@ impl Refinement {
         self.clear();
         self.make_room(view);
         self.forest.reset(world);
-        self.root_of_triangle
-            .resize(world.triangles.len(), u32::MAX);
+        self.places.reset(world.triangles.len());
+        self.memory.next_image(world.triangles.len());
+        // The rival knows areas only: no estimates, no bounds, no subdivision.
+        self.by_area = method == Method::PhongArea;
+        let visible = backend.visible_triangles();
+        self.visible = visible.len();
+        self.roots.reserve(visible.len());
+        self.make_collectors(exec, world);
+        self.ranked_roots.reserve(visible.len());
         let capabilities = backend.capabilities();
         self.is_drawn_once = !capabilities.refines_in_place();
         if self.is_drawn_once {
             self.forest
                 .draw_once(exec.level, view, capabilities.interpolation, base.colours());
-        }
-        // The rival knows areas only: no estimates, no bounds, no subdivision.
-        self.by_area = method == Method::PhongArea;
-        let shading = self.by_area.then(|| {
-            let all = ActiveLights::all(world.lights.len());
-            Shading::PerPixel(all, [[0.0; 3]; 3])
-        });
-        for (index, &triangle) in backend.visible_triangles().iter().enumerate() {
-            let is_pht = base.is_pht(world, triangle);
-            self.root_of_triangle[triangle as usize] = index as u32;
-            self.roots.push(Root {
-                triangle,
-                pixels: backend.visible_pixels(triangle),
-                prior: ranking::prior_error(world, view.encoding, base.colours(), triangle, is_pht),
-                is_pht,
-                progress: Progress::Waiting,
-                is_split: false,
-                is_refined: false,
-                shading,
-                last_paint: 0,
-            });
-        }
-        if !self.by_area {
-            self.sample_centroids(exec, world, view, base);
-            self.samples.clear();
-        }
-        for index in 0..self.roots.len() {
-            let root = self.roots[index];
-            self.pixels += u64::from(root.pixels);
-            self.error_mass += f64::from(root.pixels) * f64::from(root.prior);
-            if self.is_drawn_once && root.pixels < drawn_once::LEAST_PIXELS {
-                continue;
-            }
-            let (rank, _) = self.choose_for_root(&root, world.lights.len());
-            self.queue.push(rank, Candidate::Root(index as u32));
-        }
-    }
-
-    /// Adds to the prior error of triangles what one true colour, at their centroids, has to say.
-    fn sample_centroids(&mut self, exec: Exec, world: &World, view: &View, base: &BaseImage) {
-        let is_sampled = |root: &&mut Root| root.pixels >= PIXELS_FOR_CENTROID;
-        for root in self.roots.iter_mut().filter(is_sampled) {
-            let corners = world.triangles[root.triangle as usize].map(|v| v as usize);
-            let material = world.triangle_material[root.triangle as usize];
-            self.samples.push(
-                mean(corners.map(|v| world.positions.get(v))),
-                mean(corners.map(|v| world.normals.get(v))),
-                material,
-                mean(corners.map(|v| base.colours().get(v))),
-            );
-        }
-        self.samples.illuminate(exec, world, view);
-        for (sample, root) in self.roots.iter_mut().filter(is_sampled).enumerate() {
-            let [r, g, b] = self.samples.deviation(sample);
-            root.prior += ranking::CENTROID_SHARE * (r * r + g * g + b * b) / 3.0;
+            // That is little beside drawing them.
+            let pixels = visible.iter().map(|&t| backend.visible_pixels(t));
+            self.pixels_to_draw = pixels.map(u64::from).sum();
         }
     }
 
     /// Does one piece of work. False when there is none left, or the budget does not admit any.
     pub(super) fn step(&mut self, stage: &mut Stage<'_>, allowance: &mut Allowance<'_>) -> bool {
-        if self.paints.is_empty() {
+        if self.is_collecting() {
+            self.collect_piece(stage, allowance)
+        } else if self.paints.is_empty() {
             self.plan_piece(stage, allowance)
         } else {
             self.paint_piece(stage, allowance)
@@ -312,28 +338,42 @@ impl Refinement {
 
     /// The kind of work that the next step is.
     pub(super) fn next_kind(&self) -> Kind {
-        if self.paints.is_empty() {
+        if self.is_collecting() {
+            Kind::Collect
+        } else if self.paints.is_empty() {
             Kind::Plan
         } else {
             Kind::Paint
         }
     }
 
-    /// Estimated root mean square error of the image in codes.
+    /// Estimated root mean square error of the image in codes, as far as its triangles have been collected; NaN while nothing is
+    /// known.
     pub(super) fn estimated_error(&self) -> f64 {
+        if self.is_collecting() && self.roots.is_empty() {
+            return f64::NAN;
+        }
         (self.error_mass.max(0.0) / self.pixels.max(1) as f64).sqrt()
     }
 
-    /// Fills in how far the image has come.
+    /// Whether the budget asks for no better image.
+    pub(super) fn satisfies(&self, allowance: &Allowance<'_>) -> bool {
+        !self.is_collecting() && allowance.is_satisfied_by(self.estimated_error())
+    }
+
+    /// Fills in how far the image has come. While triangles are still being collected, that is about those that were.
     pub(super) fn report(&self, method: Method, stats: &mut FrameStats) {
         stats.estimated_error = match method {
             Method::Flat | Method::Gouraud => f64::NAN,
             _ => self.estimated_error(),
         };
+        stats.pht = self.counters.phts;
+        stats.pht_visible = self.counters.phts;
         stats.refined = self.counters.refined_phts;
         stats.triangles_subdivided = self.counters.subdivided;
         stats.leaves = self.forest.open_leaves() as u64;
         stats.phong_pixels = self.counters.phong_pixels;
+        stats.skipped.triangles_matte = self.counters.matte;
         stats.skipped.triangles_proved = self.counters.proved;
         stats.skipped.light_terms = self.counters.light_terms;
     }
@@ -346,7 +386,12 @@ impl Refinement {
 
     /// The place in `roots` of a visible triangle.
     fn root_of(&self, triangle: u32) -> Option<u32> {
-        root_of(&self.root_of_triangle, &self.roots, triangle)
+        self.places.get(triangle)
+    }
+
+    /// How a root is shaded, if that has been asked.
+    fn root_shading(&self, root: &Root) -> Option<&RootShading> {
+        self.shadings.get(root.shading as usize)
     }
 
     /// Notes that a root is being subdivided or shaded per pixel.
@@ -357,16 +402,4 @@ impl Refinement {
         root.is_refined = true;
         root.is_split |= by_splitting;
     }
-}
-
-/// The mean of a triangle's corners.
-fn mean(v: [[f32; 3]; 3]) -> [f32; 3] {
-    std::array::from_fn(|k| (v[0][k] + v[1][k] + v[2][k]) / 3.0)
-}
-
-/// The place in `roots` of a visible triangle. Entries of triangles that were visible in an earlier image are stale.
-fn root_of(root_of_triangle: &[u32], roots: &[Root], triangle: u32) -> Option<u32> {
-    let index = *root_of_triangle.get(triangle as usize)?;
-    let root = roots.get(index as usize)?;
-    (root.triangle == triangle).then_some(index)
 }

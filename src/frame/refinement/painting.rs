@@ -6,7 +6,7 @@ use crate::geometry::bary::{self, Bary};
 use crate::refine::{LeafId, LeafState};
 use crate::schedule::{Allowance, cost};
 
-/// A painting piece of several threads is at most so many times as long, per thread, as one of a single thread.
+/// A piece of several threads is at most so many times as long, per thread, as one of a single thread.
 const MOST_PIECES_AT_ONCE: u64 = 8;
 
 /// Most nominal nanoseconds of one patch: a fraction of a piece.
@@ -19,7 +19,7 @@ impl Refinement {
         stage: &mut Stage<'_>,
         allowance: &mut Allowance<'_>,
     ) -> bool {
-        let limit = painting_limit(stage, allowance);
+        let limit = piece_limit(stage, allowance);
         let mut units = 0;
         self.piece.clear();
         self.owners.clear();
@@ -107,10 +107,10 @@ impl Refinement {
     }
 }
 
-/// Most nominal nanoseconds of a painting piece. How many patches go into one decides when the clock is looked at, and
-/// nothing else. Threads share a piece, and waking them costs tens of microseconds, so pieces are longer for several of
+/// Most nominal nanoseconds of a piece that threads share. How much goes into one decides when the clock is looked at, and
+/// nothing else. Waking threads costs tens of microseconds, so pieces are longer for several of
 /// them while the deadline is far away: a quarter of what is left.
-fn painting_limit(stage: &Stage<'_>, allowance: &Allowance<'_>) -> u64 {
+pub(super) fn piece_limit(stage: &Stage<'_>, allowance: &Allowance<'_>) -> u64 {
     let threads = stage.exec.threads as u64;
     if threads == 1 {
         return PIECE_UNITS;

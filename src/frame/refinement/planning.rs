@@ -2,7 +2,9 @@
 
 use super::parts;
 use super::ranking::{self, Action};
-use super::{Candidate, Owner, PIECE_UNITS, Progress, Refinement, Root, Shading, Stage, root_of};
+use super::{
+    Candidate, Owner, PIECE_UNITS, Progress, Refinement, Root, RootShading, Shading, Stage,
+};
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
 use crate::highlight;
@@ -19,7 +21,7 @@ impl Refinement {
     ) -> bool {
         let mut units = 0;
         while units < PIECE_UNITS {
-            let Some(candidate) = self.queue.pop() else {
+            let Some(candidate) = self.next_candidate() else {
                 break;
             };
             let Some(action) = self.decide(stage, candidate) else {
@@ -51,6 +53,15 @@ impl Refinement {
         units > 0
     }
 
+    /// Takes the best candidate; among equals those come first that were collected.
+    fn next_candidate(&mut self) -> Option<Candidate> {
+        if self.ranked_roots.best() >= self.queue.best() {
+            self.ranked_roots.pop().map(Candidate::Root)
+        } else {
+            self.queue.pop()
+        }
+    }
+
     /// What to do with a candidate; `None` when it has become void.
     fn decide(&self, stage: &Stage<'_>, candidate: Candidate) -> Option<Action> {
         match candidate {
@@ -59,7 +70,7 @@ impl Refinement {
                 // It may have been planted in this very piece, as the neighbour of another.
                 let is_waiting =
                     root.progress == Progress::Waiting && !self.forest.is_planted(root.triangle);
-                is_waiting.then(|| self.choose_for_root(&root, stage.world.lights.len()).1)
+                is_waiting.then(|| self.root_ranking(stage.world.lights.len()).choose(&root).1)
             }
             Candidate::Leaf(leaf) => {
                 let is_open = self.forest.leaf(leaf).state == LeafState::Open;
@@ -74,7 +85,8 @@ impl Refinement {
         let units = match (candidate, action) {
             (Candidate::Root(_), Action::Shade) => cost::LIST_NS,
             (Candidate::Root(index), Action::Split(_)) => {
-                self.planting_cost(self.roots[index as usize].pixels, lights)
+                let pixels = self.roots[index as usize].pixels;
+                self.root_ranking(lights).planting_cost(pixels)
             }
             (Candidate::Leaf(leaf), Action::Shade) => {
                 ranking::cutting_cost(self.forest.leaf(leaf).pixels as f32, lights)
@@ -91,7 +103,7 @@ impl Refinement {
 
     /// What bounding the lights on the candidate's root will cost, should it come to that.
     fn bounds_cost(&self, stage: &Stage<'_>, candidate: Candidate) -> u64 {
-        if self.is_drawn_once {
+        if self.is_drawn_once || self.by_area {
             return 0;
         }
         let root = match candidate {
@@ -101,7 +113,7 @@ impl Refinement {
         };
         let root = root.map(|index| self.roots[index as usize]);
         match root {
-            Some(root) if root.shading.is_none() && bounds_pay(&root, stage) => {
+            Some(root) if self.root_shading(&root).is_none() && bounds_pay(&root, stage) => {
                 cost::bounds(stage.world.lights.len()) as u64
             }
             _ => 0,
@@ -141,10 +153,11 @@ impl Refinement {
             Action::Shade => return self.shade_leaf(stage, leaf),
             Action::Split(marks) => marks,
         };
-        let (roots, root_of_triangle) = (&self.roots, &self.root_of_triangle);
+        let (roots, places) = (&self.roots, &self.places);
         // A neighbour that is right already, or that nobody sees, need not follow a split.
         let pixels_to_follow = |triangle: u32| {
-            root_of(root_of_triangle, roots, triangle)
+            places
+                .get(triangle)
                 .map(|index| roots[index as usize])
                 .filter(|root| root.progress != Progress::Done)
                 .map_or(0, |root| root.pixels)
@@ -190,7 +203,9 @@ impl Refinement {
         if let Some(index) = self.root_of(self.forest.leaf(leaf).triangle) {
             let root = &mut self.roots[index as usize];
             root.progress = Progress::Planted;
-            self.error_mass -= f64::from(root.pixels) * f64::from(root.prior);
+            self.memory
+                .note(root.triangle, self.forest.leaf(leaf).error);
+            self.error_mass -= root.mass();
             self.error_mass += self.leaf_mass(leaf);
         }
         self.offer_leaf(stage, leaf);
@@ -238,9 +253,12 @@ impl Refinement {
     fn shade_root(&mut self, stage: &Stage<'_>, index: u32) {
         let root = self.roots[index as usize];
         self.roots[index as usize].progress = Progress::Done;
-        self.error_mass -= f64::from(root.pixels) * f64::from(root.prior);
+        self.error_mass -= root.mass();
         self.shade_patch(stage, index, Bary::ROOT, root.pixels);
-        self.roots[index as usize].last_paint = self.enqueued;
+        let place = self.roots[index as usize].shading as usize;
+        if let Some(shading) = self.shadings.get_mut(place) {
+            shading.last_paint = self.enqueued;
+        }
     }
 
     /// Has the pixels of a leaf shaded.
@@ -272,11 +290,11 @@ impl Refinement {
     /// Which terms the pixels of a root need: by its bounds, if finding those costs less than they may save.
     pub(super) fn shading(&mut self, stage: &Stage<'_>, index: u32) -> Shading {
         let root = self.roots[index as usize];
-        if let Some(shading) = root.shading {
-            return shading;
+        if let Some(known) = self.root_shading(&root) {
+            return known.shading;
         }
         let count = stage.world.lights.len();
-        let shading = if !bounds_pay(&root, stage) {
+        let shading = if self.by_area || !bounds_pay(&root, stage) {
             Shading::PerPixel(ActiveLights::all(count), [[0.0; 3]; 3])
         } else {
             self.units_for_bounds += cost::bounds(count) as u64;
@@ -293,7 +311,11 @@ impl Refinement {
                 Shading::PerPixel(bounds.active, remainder)
             }
         };
-        self.roots[index as usize].shading = Some(shading);
+        self.roots[index as usize].shading = self.shadings.len() as u32;
+        self.shadings.push(RootShading {
+            shading,
+            last_paint: 0,
+        });
         shading
     }
 
@@ -304,7 +326,7 @@ impl Refinement {
             Candidate::Part(part) => self.offer_part(stage, part),
             Candidate::Root(index) => {
                 let root = self.roots[index as usize];
-                let (rank, _) = self.choose_for_root(&root, stage.world.lights.len());
+                let (rank, _) = self.root_ranking(stage.world.lights.len()).choose(&root);
                 self.queue.push(rank, candidate);
             }
         }

@@ -11,10 +11,8 @@
 use super::drawn_once;
 use super::parts::{self, CUT, SAMPLES_PER_PART};
 use super::{Refinement, Root, Shading, Stage};
-use crate::geometry::Vec3s;
 use crate::output::Encoding;
-use crate::refine::LeafId;
-use crate::scene::World;
+use crate::refine::{Forest, LeafId};
 use crate::schedule::cost;
 
 /// Smallest mean squared error that is believed. An estimate of zero is no proof, so everything that is not proved
@@ -37,27 +35,21 @@ pub(super) enum Action {
     Split(u8),
 }
 
+/// How light a linear colour is, in codes.
+pub(super) fn lightness(encoding: Encoding, [r, g, b]: [f32; 3]) -> f32 {
+    let light = ((r + g + b) / 3.0).clamp(0.0, 1.0);
+    255.0
+        * match encoding {
+            // The square root is close enough to the sRGB curve.
+            Encoding::Srgb => light.sqrt(),
+            Encoding::Linear => light,
+        }
+}
+
 /// What is added to the mean squared error of a triangle for what its centroid does not show: shading that changes by so
 /// many codes between corners deviates from linear by a fraction of it, and a highlight inside by more. A guess, to be
 /// replaced by an estimate when the triangle's turn comes.
-pub(super) fn prior_error(
-    world: &World,
-    encoding: Encoding,
-    colours: &Vec3s,
-    triangle: u32,
-    is_pht: bool,
-) -> f32 {
-    let corners = world.triangles[triangle as usize];
-    let [a, b, c] = corners.map(|v| {
-        let [r, g, b] = colours.get(v as usize);
-        let light = ((r + g + b) / 3.0).clamp(0.0, 1.0);
-        255.0
-            * match encoding {
-                // The square root is close enough to the sRGB curve.
-                Encoding::Srgb => light.sqrt(),
-                Encoding::Linear => light,
-            }
-    });
+pub(super) fn prior_error([a, b, c]: [f32; 3], is_pht: bool) -> f32 {
     let contrast = a.max(b).max(c) - a.min(b).min(c);
     let highlight = if is_pht { 4.0 } else { 0.0 };
     contrast * contrast / 1024.0 + highlight + ERROR_FLOOR
@@ -72,16 +64,23 @@ pub(super) fn cutting_cost(pixels: f32, lights: usize) -> f32 {
     }
 }
 
-impl Refinement {
-    /// Nominal cost of making a triangle or leaf of `pixels` pixels a leaf that can be split.
-    pub(super) fn planting_cost(&self, pixels: u32, lights: usize) -> f32 {
-        let samples = self.forest.sample_count(pixels);
-        cost::leaves(1.0, POINTS_PER_LEAF, lights) + cost::samples(samples, lights)
-    }
+/// What is known of an image that ranks triangles which have not been looked at.
+#[derive(Clone, Copy)]
+pub(super) struct RootRanking<'a> {
+    pub(super) forest: &'a Forest,
+    /// How many lights there are.
+    pub(super) lights: usize,
+    /// See [`Refinement::by_area`].
+    pub(super) by_area: bool,
+    /// See [`Refinement::is_drawn_once`].
+    pub(super) is_drawn_once: bool,
+}
 
-    /// What to do with a triangle that has not been looked at, and its rank: shade it, or make it the root of a
-    /// subdivision, whose first split is assumed to be into four.
-    pub(super) fn choose_for_root(&self, root: &Root, lights: usize) -> (f32, Action) {
+impl RootRanking<'_> {
+    /// What to do with a triangle, and its rank: shade it, or make it the root of a subdivision, whose first split is
+    /// assumed to be into four.
+    #[inline]
+    pub(super) fn choose(&self, root: &Root) -> (f32, Action) {
         let pixels = root.pixels as f32;
         if self.by_area {
             return (pixels, Action::Shade);
@@ -90,14 +89,32 @@ impl Refinement {
         let shade = if self.is_drawn_once {
             0.0
         } else {
-            benefit / cost::phong(pixels, lights)
+            benefit / cost::phong(pixels, self.lights)
         };
-        let planting = self.planting_cost(root.pixels, lights);
-        let split = benefit * (15.0 / 16.0) / (planting + split_cost(pixels, 3, lights));
+        let planting = self.planting_cost(root.pixels);
+        let split = benefit * (15.0 / 16.0) / (planting + split_cost(pixels, 3, self.lights));
         if split > shade {
             (split, Action::Split(7))
         } else {
             (shade, Action::Shade)
+        }
+    }
+
+    /// Nominal cost of making a triangle of `pixels` pixels a leaf that can be split.
+    pub(super) fn planting_cost(&self, pixels: u32) -> f32 {
+        let samples = self.forest.sample_count(pixels);
+        cost::leaves(1.0, POINTS_PER_LEAF, self.lights) + cost::samples(samples, self.lights)
+    }
+}
+
+impl Refinement {
+    /// How triangles that have not been looked at are ranked.
+    pub(super) fn root_ranking(&self, lights: usize) -> RootRanking<'_> {
+        RootRanking {
+            forest: &self.forest,
+            lights,
+            by_area: self.by_area,
+            is_drawn_once: self.is_drawn_once,
         }
     }
 
@@ -175,7 +192,7 @@ impl Refinement {
     /// How many lights a triangle's pixels are shaded under, as far as is known.
     pub(super) fn active_lights(&self, stage: &Stage<'_>, triangle: u32) -> usize {
         let root = self.root_of(triangle).map(|i| self.roots[i as usize]);
-        match root.and_then(|root| root.shading) {
+        match root.and_then(|root| self.root_shading(&root).map(|s| s.shading)) {
             Some(Shading::Proved) => 0,
             Some(Shading::PerPixel(active, _)) => active.diffuse.len(),
             None => stage.world.lights.len(),
