@@ -8,32 +8,6 @@ use super::tile::{BlockSet, NO_DEPTH, NO_TRIANGLE, TILE_BLOCKS, TILE_PIXELS};
 use crate::parallel::Watch;
 use std::sync::{Mutex, PoisonError};
 
-/// What drawing changes.
-#[derive(Clone)]
-pub(super) struct Layers {
-    /// Reversed depth of each pixel, or [`NO_DEPTH`].
-    pub depth: [f32; TILE_PIXELS],
-    /// The slot of the triangle that owns each pixel, or [`NO_TRIANGLE`].
-    pub slot: [u32; TILE_PIXELS],
-    /// A depth that no pixel of a block is farther than.
-    pub farthest: [f32; TILE_BLOCKS],
-    /// Blocks in which some pixel has a triangle.
-    pub owned: BlockSet,
-}
-
-impl Layers {
-    /// Nothing drawn. (No constant, which would be copied from memory.)
-    #[inline(always)]
-    pub(super) fn empty() -> Self {
-        Self {
-            depth: [NO_DEPTH; TILE_PIXELS],
-            slot: [NO_TRIANGLE; TILE_PIXELS],
-            farthest: [NO_DEPTH; TILE_BLOCKS],
-            owned: BlockSet::EMPTY,
-        }
-    }
-}
-
 /// The piece to be drawn next.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Next {
@@ -45,7 +19,14 @@ pub(super) struct Next {
 
 /// A tile that has been set aside.
 pub(super) struct Unfinished {
-    pub layers: Layers,
+    /// What a canvas has of the same name.
+    pub depth: [f32; TILE_PIXELS],
+    /// Likewise.
+    pub slot: [u32; TILE_PIXELS],
+    /// Likewise.
+    pub farthest: [f32; TILE_BLOCKS],
+    /// Likewise.
+    pub owned: BlockSet,
     pub next: Next,
 }
 
@@ -62,15 +43,15 @@ pub(super) enum Drawing {
 }
 
 impl Drawing {
-    /// Sets the tile aside.
+    /// Sets the tile aside, and returns where what there is of it belongs.
     #[cold]
-    pub(super) fn set_aside(&mut self, desk: &Desk<'_>, layers: &Layers, next: Next) {
+    pub(super) fn set_aside(&mut self, desk: &Desk<'_>) -> Option<&mut Unfinished> {
         if !matches!(self, Self::Unfinished(_)) {
             *self = Self::Unfinished(desk.spare.take());
         }
-        if let Self::Unfinished(unfinished) = self {
-            unfinished.layers.clone_from(layers);
-            unfinished.next = next;
+        match self {
+            Self::Unfinished(block) => Some(block),
+            _ => None,
         }
     }
 
@@ -111,7 +92,10 @@ impl Spare {
 
 fn new_block() -> Box<Unfinished> {
     Box::new(Unfinished {
-        layers: Layers::empty(),
+        depth: [NO_DEPTH; TILE_PIXELS],
+        slot: [NO_TRIANGLE; TILE_PIXELS],
+        farthest: [NO_DEPTH; TILE_BLOCKS],
+        owned: BlockSet::EMPTY,
         next: Next::default(),
     })
 }

@@ -22,11 +22,14 @@
 )]
 
 use super::brush::{Brush, MOST_PARTS, PixelPlaces};
-use super::drawing::{Desk, Drawing, Layers, Next};
+use super::drawing::{Desk, Drawing, Next, Unfinished};
 use super::edges::{BlockEdge, BlockRange, TileEdges, is_inner, small_edges};
 use super::setup::Piece;
 use super::shares::{Share, add_pixels};
-use super::tile::{BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, NO_DEPTH, NO_TRIANGLE, Tile};
+use super::tile::{
+    BLOCK_PIXELS, BLOCK_SIDE, BLOCKS_ACROSS, BlockSet, NO_DEPTH, NO_TRIANGLE, TILE_BLOCKS,
+    TILE_PIXELS, Tile,
+};
 use crate::simd::Simd;
 use fearless_simd::{Select, SimdBase, SimdInt, SimdMask};
 
@@ -52,7 +55,10 @@ pub(super) fn draw_tile<S: Simd>(
     desk: &Desk<'_>,
 ) {
     let mut canvas = Canvas {
-        layers: Layers::empty(),
+        depth: [NO_DEPTH; TILE_PIXELS],
+        slot: [NO_TRIANGLE; TILE_PIXELS],
+        farthest: [NO_DEPTH; TILE_BLOCKS],
+        owned: BlockSet::default(),
         origin: tile.origin,
         size: [tile.width, tile.height],
         places: PixelPlaces::new(simd),
@@ -60,7 +66,7 @@ pub(super) fn draw_tile<S: Simd>(
     };
     let mut next = Next::default();
     if let Drawing::Unfinished(unfinished) = drawing {
-        canvas.layers.clone_from(&unfinished.layers);
+        canvas.take_up(unfinished);
         next = unfinished.next;
     }
     while let Some(share) = shares.get(next.share) {
@@ -71,7 +77,10 @@ pub(super) fn draw_tile<S: Simd>(
             if canvas.effort >= EFFORT_AT_ONCE {
                 canvas.effort = 0;
                 if !desk.watch.may_go_on() {
-                    drawing.set_aside(desk, &canvas.layers, next);
+                    if let Some(unfinished) = drawing.set_aside(desk) {
+                        canvas.leave(unfinished);
+                        unfinished.next = next;
+                    }
                     return;
                 }
             }
@@ -81,14 +90,21 @@ pub(super) fn draw_tile<S: Simd>(
             entry: 0,
         };
     }
-    hand_over(simd, &canvas.layers, tile, shares);
+    hand_over(simd, &canvas, tile, shares);
     drawing.finish(desk);
 }
 
 /// A tile that is being drawn, on the stack of the thread that draws it and in its caches: waiting for the tile's own memory
 /// would take longer than drawing.
 struct Canvas<S: Simd> {
-    layers: Layers,
+    /// Reversed depth of each pixel, or [`NO_DEPTH`].
+    depth: [f32; TILE_PIXELS],
+    /// The slot of the triangle that owns each pixel, or [`NO_TRIANGLE`].
+    slot: [u32; TILE_PIXELS],
+    /// A depth that no pixel of a block is farther than.
+    farthest: [f32; TILE_BLOCKS],
+    /// Blocks in which some pixel has a triangle.
+    owned: BlockSet,
     /// The image pixel in the top left corner.
     origin: [i32; 2],
     /// Columns and rows inside the image.
@@ -99,6 +115,23 @@ struct Canvas<S: Simd> {
 }
 
 impl<S: Simd> Canvas<S> {
+    /// Goes on with a tile that was set aside.
+    fn take_up(&mut self, unfinished: &Unfinished) {
+        self.depth.copy_from_slice(&unfinished.depth);
+        self.slot.copy_from_slice(&unfinished.slot);
+        self.farthest.copy_from_slice(&unfinished.farthest);
+        self.owned = unfinished.owned;
+    }
+
+    /// Keeps what there is of a tile that is set aside.
+    #[cold]
+    fn leave(&self, unfinished: &mut Unfinished) {
+        unfinished.depth.copy_from_slice(&self.depth);
+        unfinished.slot.copy_from_slice(&self.slot);
+        unfinished.farthest.copy_from_slice(&self.farthest);
+        unfinished.owned = self.owned;
+    }
+
     #[inline(always)]
     fn draw(&mut self, simd: S, piece: &Piece) {
         let pixels = piece.bounds.within(self.origin);
@@ -149,7 +182,7 @@ impl<S: Simd> Canvas<S> {
         }
         for y in range.y0..=range.y1 {
             let row_depths = brush.row_depths(simd, &self.places, y);
-            let mut owned = self.layers.owned.row(y);
+            let mut owned = self.owned.row(y);
             let (mut values, mut columns) = (row_values, columns);
             for x in range.x0..=range.x1 {
                 let mut inside = [S::mask32s::splat(simd, true); MOST_PARTS];
@@ -166,7 +199,7 @@ impl<S: Simd> Canvas<S> {
                 }
                 self.put(simd, brush.slot, [x, y], inside, depths, &mut owned);
             }
-            self.layers.owned.insert_row(y, owned);
+            self.owned.insert_row(y, owned);
             for k in 0..3 {
                 for part in 0..parts {
                     row_values[k][part] += edges[k].dy * side;
@@ -199,7 +232,7 @@ impl<S: Simd> Canvas<S> {
                 let [some, all] = brush.coverage(simd, &values, right);
                 let [least, most] = brush.depth_ranges(simd, [first, y]);
                 let at = y * BLOCKS_ACROSS + first;
-                let farthest = S::f32s::from_slice(simd, &self.layers.farthest[at..at + width]);
+                let farthest = S::f32s::from_slice(simd, &self.farthest[at..at + width]);
                 // What is nowhere strictly nearer loses.
                 let drawn =
                     (some & most.simd_gt(farthest)).to_bitmask() & range.columns_from(first);
@@ -208,9 +241,9 @@ impl<S: Simd> Canvas<S> {
                     let filled = S::mask32s::from_bitmask(simd, full);
                     filled
                         .select(least.max(farthest), farthest)
-                        .store_slice(&mut self.layers.farthest[at..at + width]);
+                        .store_slice(&mut self.farthest[at..at + width]);
                 }
-                let mut owned = self.layers.owned.row(y);
+                let mut owned = self.owned.row(y);
                 // One kind after the other, so that branches can be predicted.
                 let mut left = drawn & !full;
                 while left != 0 {
@@ -232,7 +265,7 @@ impl<S: Simd> Canvas<S> {
                     let inside = [S::mask32s::splat(simd, true); MOST_PARTS];
                     self.draw_block(simd, &brush, &row_depths, place, inside, &mut owned);
                 }
-                self.layers.owned.insert_row(y, owned);
+                self.owned.insert_row(y, owned);
             }
         }
     }
@@ -274,8 +307,8 @@ impl<S: Simd> Canvas<S> {
         let mut any = 0;
         for part in 0..PixelPlaces::<S>::parts() {
             let at = first + part * width;
-            let depth = &mut self.layers.depth[at..at + width];
-            let owner = &mut self.layers.slot[at..at + width];
+            let depth = &mut self.depth[at..at + width];
+            let owner = &mut self.slot[at..at + width];
             let stored = S::f32s::from_slice(simd, depth);
             // A maximum, since compilers make a masked store of a selection, which some processors take ten times as long for.
             let offered = inside[part].select(depths[part], nothing);
@@ -291,15 +324,15 @@ impl<S: Simd> Canvas<S> {
 
 /// Copies the owned blocks to the tile, and counts the covered pixels and those of each triangle.
 #[inline(always)]
-fn hand_over<S: Simd>(simd: S, layers: &Layers, tile: &mut Tile, shares: &[Share]) {
+fn hand_over<S: Simd>(simd: S, canvas: &Canvas<S>, tile: &mut Tile, shares: &[Share]) {
     let width = S::u32s::LEN;
     let mut covered = 0;
     // A large triangle fills block after block.
     let (mut last, mut count) = (NO_TRIANGLE, 0);
-    for block in layers.owned.iter() {
+    for block in canvas.owned.iter() {
         for part in 0..BLOCK_PIXELS / width {
             let at = block * BLOCK_PIXELS + part * width;
-            let slots = &layers.slot[at..at + width];
+            let slots = &canvas.slot[at..at + width];
             let vector = S::u32s::from_slice(simd, slots);
             vector.store_slice(&mut tile.slot[at..at + width]);
             let mut left = vector.simd_ne(NO_TRIANGLE).to_bitmask();
@@ -322,5 +355,5 @@ fn hand_over<S: Simd>(simd: S, layers: &Layers, tile: &mut Tile, shares: &[Share
         add_pixels(shares, last, count);
     }
     tile.covered = covered;
-    tile.owned = layers.owned;
+    tile.owned = canvas.owned;
 }
