@@ -299,6 +299,7 @@ impl Picture {
             return drawing_ms;
         }
         let mut since = allowance.elapsed_ms();
+        let has_frame_to_itself = allowance.record().images == 0;
         while !refinement.satisfies(allowance) {
             let presenting_ms = load::pending_ms(
                 easel.costs,
@@ -318,6 +319,9 @@ impl Picture {
             easel.book(kind, load, now - since);
             since = now;
             if !is_done {
+                if has_frame_to_itself && allowance.nominal_ns() == 0 && !refinement.is_finished() {
+                    easel.costs.doubt(kind);
+                }
                 break;
             }
         }

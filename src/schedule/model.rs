@@ -29,6 +29,9 @@ const MOST_SURPRISE: f64 = 2.0;
 /// Weight of a measurement in the typical deviation.
 const SPREAD_STEP: f64 = 0.1;
 
+/// What is left of a rate that was doubted.
+const DOUBT: f64 = 0.8;
+
 /// A part of a rate is never lower: the next measurement could not raise it by multiplication.
 const LEAST_RATE: f64 = 1e-3;
 
@@ -177,6 +180,12 @@ impl Rate {
         self.step(load, STEP * predicted * (surprise - 1.0));
     }
 
+    /// Lowers the rate. What is thought to take too long for any frame is never measured again, so nothing else would.
+    pub fn doubt(&mut self) {
+        self.items = (self.items * DOUBT).max(LEAST_RATE);
+        self.pixels = (self.pixels * DOUBT).max(LEAST_RATE);
+    }
+
     /// Changes the rate as little as possible, so that the load is predicted to take `ms` more.
     fn step(&mut self, load: Load, ms: f64) {
         let [x, y] = [load.items_ns * 1e-6, load.pixels_ns * 1e-6];
@@ -220,6 +229,11 @@ impl CostModel {
     /// Takes note that the work took `ms` milliseconds.
     pub fn learn(&mut self, kind: Kind, load: Load, ms: f64) {
         self.rate_mut(kind).learn(load, ms);
+    }
+
+    /// Lowers the rate of work that was not admitted though a whole frame was there for it.
+    pub fn doubt(&mut self, kind: Kind) {
+        self.rate_mut(kind).doubt();
     }
 
     /// Whether all rates are positive numbers, which those of a file need not be.
