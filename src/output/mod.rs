@@ -9,6 +9,7 @@ pub mod png;
 pub mod sequence;
 pub mod target;
 pub mod timing;
+pub mod whole_file;
 pub mod y4m;
 
 pub use encoding::Encoding;
@@ -17,3 +18,4 @@ pub use interpolation::Interpolation;
 pub use png::SaveError;
 pub use target::{ChannelOrder, Stamp, Target, TargetError};
 pub use timing::{FrameRate, Timing};
+pub use whole_file::save_whole;
