@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 use std::fs;
+use std::io::BufReader;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -181,6 +182,116 @@ fn one_chart_may_be_one_file() {
     }
 }
 
+/// The size of a PNG file, and its pixels as red, green and blue.
+fn png(path: &Path) -> ([u32; 2], Vec<u8>) {
+    let file = BufReader::new(fs::File::open(path).expect("written"));
+    let mut reader = png::Decoder::new(file).read_info().expect("a PNG file");
+    let mut pixels = vec![0; reader.output_buffer_size().expect("small")];
+    let info = reader.next_frame(&mut pixels).expect("an image");
+    assert_eq!(info.color_type, png::ColorType::Rgb);
+    ([info.width, info.height], pixels)
+}
+
+#[test]
+fn a_sheet_shows_all_methods_with_the_errors_of_their_pixels() {
+    let directory = workplace();
+    let place = directory.path();
+    let common = [
+        "compare", "one.ron", "--size", "160x120", "--repeat", "1", "--json",
+    ];
+    let run = |rest: &[&str]| {
+        let output = specula(place, &[&common[..], rest].concat());
+        assert_success(&output);
+        let object: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        object
+    };
+    let all = run(&["-o", "all.png"]);
+    let methods = all["methods"].as_array().expect("a list");
+    assert_eq!(methods.len(), specula::Method::ALL.len());
+    for method in methods {
+        assert_eq!(method["budget_ms"], all["budget_ms"]);
+        assert!(method["rmse"].is_number() && method["frame_ms"].is_number());
+    }
+    assert_eq!(all["fraction"], 0.3);
+    assert!(all["calibration"]["phong_ms"].is_number() && all["noise"]["drift"].is_number());
+    assert_eq!(files(place), ["all.png", "one.ron", "two.ron"]);
+
+    // In a sheet of Gouraud shading alone, errors are bright on black; in one of Phong shading there are none.
+    let brightest = |name: &str, method: &str| {
+        let numbers = run(&["-o", name, "--methods", method, "--budget", "0"]);
+        assert_eq!(numbers["methods"][0]["method"], method);
+        let ([width, height], pixels) = png(&place.join(name));
+        assert!(width > 2 * 160 && height > 2 * 120);
+        // The cell of the method is the second of two; its errors are below the middle.
+        let is_error = |index: &usize| {
+            let [x, y] = [index % width as usize, index / width as usize];
+            x > width as usize / 2 && y > height as usize * 11 / 20 && y < height as usize - 60
+        };
+        let triples = pixels.chunks_exact(3).enumerate();
+        triples
+            .filter(|(index, _)| is_error(index))
+            .map(|(_, rgb)| rgb.iter().map(|&c| u32::from(c)).sum::<u32>())
+            .max()
+    };
+    let gouraud = brightest("gouraud.png", "gouraud").expect("pixels");
+    let phong = brightest("phong.png", "phong").expect("pixels");
+    // Gray is what the scene does not cover; an error of a single code is dark.
+    assert!(gouraud > 450 && phong < 300, "{gouraud} {phong}");
+}
+
+#[test]
+fn a_film_can_be_compared_with_its_references() {
+    let directory = workplace();
+    let animate = |rest: &[&str]| {
+        let common = [
+            "animate",
+            "one.ron",
+            "--size",
+            "64x48",
+            "--duration",
+            "0.4",
+            "--fps",
+            "10",
+            "--json",
+            "--error",
+        ];
+        let output = specula(directory.path(), &[&common[..], rest].concat());
+        assert_success(&output);
+        let frames: Vec<Value> = text(&output.stdout)
+            .lines()
+            .map(|line| serde_json::from_str(line).expect("a JSON object per line"))
+            .collect();
+        (frames, text(&output.stderr).to_owned())
+    };
+    let (frames, summary) = animate(&["-o", "film.apng", "--method", "gouraud"]);
+    assert_eq!(frames.len(), 4);
+    assert!(
+        frames
+            .iter()
+            .all(|frame| frame["error"]["rmse"].as_f64() > Some(0.5))
+    );
+    // There is no frame before the first.
+    assert!(frames[0]["flicker"].is_null());
+    assert!(
+        frames[1..]
+            .iter()
+            .all(|frame| frame["flicker"].as_f64() > Some(0.1))
+    );
+    assert!(summary.contains("flicker "), "{summary}");
+
+    let (frames, _) = animate(&["-o", "film.apng", "--method", "phong"]);
+    assert!(
+        frames[1..]
+            .iter()
+            .all(|frame| frame["flicker"].as_f64() < Some(0.5))
+    );
+    // Every other frame has no neighbours.
+    let (frames, summary) = animate(&["-o", "###.png", "--shard", "1/2"]);
+    assert_eq!(frames.len(), 2);
+    assert!(frames.iter().all(|frame| frame["flicker"].is_null()));
+    assert!(!summary.contains("flicker "), "{summary}");
+}
+
 #[test]
 fn what_cannot_be_done_is_said_in_a_sentence_and_leaves_no_files() {
     let directory = workplace();
@@ -232,6 +343,40 @@ fn what_cannot_be_done_is_said_in_a_sentence_and_leaves_no_files() {
             ],
             1,
             "error: cannot write none/a.json: No such file",
+        ),
+        (
+            vec!["compare", "one.ron", "-o", "a.jpg"],
+            2,
+            "error: the output must be a .png file, which 'a.jpg' is not",
+        ),
+        (
+            vec!["compare", "one.ron", "-o", "folder.png"],
+            1,
+            "error: cannot write folder.png: ",
+        ),
+        (
+            vec!["compare", "one.ron", "-o", "a.png", "--backend", "skia"],
+            2,
+            "give --budget",
+        ),
+        (
+            vec![
+                "compare",
+                "one.ron",
+                "-o",
+                "a.png",
+                "--backend",
+                "skia",
+                "--budget",
+                "1",
+            ],
+            2,
+            "error: ",
+        ),
+        (
+            vec!["compare", "none.ron", "-o", "a.png"],
+            1,
+            "error: cannot read scene 'none.ron'",
         ),
     ] {
         let output = specula(place, &arguments);

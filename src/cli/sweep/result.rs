@@ -1,6 +1,6 @@
 //! What a sweep has found out about a scene.
 
-use crate::cli::report::list;
+use crate::cli::report::noise_warning;
 use serde::Serialize;
 use specula::measure::{Calibration, Curve, CurveArea, Noise, SweepRow};
 
@@ -53,27 +53,7 @@ impl SceneResult {
 
     /// Why the times are not to be trusted, if so.
     pub(super) fn warning(&self) -> Option<String> {
-        let noise = self.noise.filter(Noise::is_too_much)?;
-        let percent = |share: f64| share * 100.0;
-        let mut reasons = Vec::new();
-        if noise.spread > Noise::MOST_SPREAD {
-            reasons.push(format!(
-                "quartiles {:.0} % apart (limit {:.0} %)",
-                percent(noise.spread),
-                percent(Noise::MOST_SPREAD)
-            ));
-        }
-        if noise.drift > Noise::MOST_DRIFT {
-            reasons.push(format!(
-                "medians changed by {:.1} % (limit {:.0} %)",
-                percent(noise.drift),
-                percent(Noise::MOST_DRIFT)
-            ));
-        }
-        Some(format!(
-            "machine too noisy to trust these times: {}",
-            list(reasons)
-        ))
+        self.noise.as_ref().and_then(noise_warning)
     }
 }
 

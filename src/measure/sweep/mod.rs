@@ -227,13 +227,13 @@ impl<'a> Sweep<'a> {
     pub fn run_with_images(
         &mut self,
         budget: SweepBudget,
-        mut on_image: impl FnMut(SweepRow, &Frame),
+        mut on_image: impl FnMut(SweepRow, Frame),
     ) {
         for method in 0..self.engines.len() {
             self.warm_up(method);
         }
         for method in 0..self.engines.len() {
-            let images: Vec<(SweepRow, Frame)> = (0..self.options.repeats.max(1))
+            let mut images: Vec<(SweepRow, Frame)> = (0..self.options.repeats.max(1))
                 .map(|_| {
                     self.render(method, budget, Start::Cold);
                     let stats = self.render(method, budget, Start::Cold);
@@ -241,8 +241,9 @@ impl<'a> Sweep<'a> {
                     (row, self.frame.clone())
                 })
                 .collect();
-            let (row, frame) = &images[median_index(&images, |(row, _)| row.frame_ms)];
-            on_image(row.clone(), frame);
+            let middle = median_index(&images, |(row, _)| row.frame_ms);
+            let (row, frame) = images.swap_remove(middle);
+            on_image(row, frame);
         }
     }
 
@@ -428,6 +429,25 @@ mod tests {
         assert!(Noise::between(&before, &after).drift < 1e-9);
         assert!(gouraud_rmse > 0.0);
         assert_eq!(before.gouraud_rmse, gouraud_rmse);
+    }
+
+    #[test]
+    fn images_come_with_their_rows() {
+        let scene = scene();
+        let options = SweepOptions {
+            repeats: 3,
+            ..options()
+        };
+        let mut sweep = Sweep::new("teapot", &scene, options).expect("one thread");
+        let mut images = Vec::new();
+        sweep.run_with_images(SweepBudget::from_millis(1.0), |row, frame| {
+            images.push((row, frame));
+        });
+        assert_eq!(images.len(), 2);
+        for (row, frame) in &images {
+            let error = ErrorReport::compare(frame, sweep.reference()).expect("same size");
+            assert_eq!(error, row.error, "{}", row.method);
+        }
     }
 
     #[test]
