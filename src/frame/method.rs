@@ -19,16 +19,20 @@ pub enum Method {
     /// Gouraud first, then per-pixel Phong, triangles with most visible pixels first: the simple rival of
     /// [`Adaptive`](Self::Adaptive).
     PhongArea,
+    /// Gouraud first, then per-pixel Phong, squares of the image in a fixed shuffled order: a rival of
+    /// [`Adaptive`](Self::Adaptive) that knows nothing of the scene.
+    PhongTiles,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Flat,
         Self::Gouraud,
         Self::Phong,
         Self::Adaptive,
         Self::PhongArea,
+        Self::PhongTiles,
     ];
 
     /// The name used on the command line and in reports.
@@ -40,13 +44,19 @@ impl Method {
             Self::Phong => "phong",
             Self::Adaptive => "adaptive",
             Self::PhongArea => "phong-area",
+            Self::PhongTiles => "phong-tiles",
         }
+    }
+
+    /// Whether refinement takes triangles one by one, best first.
+    pub(super) fn refines_triangles(self) -> bool {
+        matches!(self, Self::Adaptive | Self::PhongArea)
     }
 
     /// Whether frames go on refining the image, so that a budget makes a difference.
     #[must_use]
     pub fn is_progressive(self) -> bool {
-        matches!(self, Self::Adaptive | Self::PhongArea)
+        self.refines_triangles() || self == Self::PhongTiles
     }
 }
 

@@ -12,6 +12,7 @@ mod refine_first;
 mod refinement;
 mod renderer;
 mod stats;
+mod tiles;
 
 pub use engine::Engine;
 pub use method::Method;

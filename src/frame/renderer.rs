@@ -5,6 +5,7 @@ use super::base::BaseImage;
 use super::refine_first::RefineFirst;
 use super::refinement::Refinement;
 use super::stats::{FrameStats, Outcome, StageTimes};
+use super::tiles::Tiles;
 use crate::backend::Backend;
 use crate::geometry::screen::MAX_IMAGE_SIDE;
 use crate::output::{Encoding, Stamp, Target};
@@ -42,6 +43,8 @@ pub(super) struct Renderer {
     pub(super) refinement: Refinement,
     /// For a backend that cannot repaint.
     pub(super) refine_first: RefineFirst,
+    /// For [`Method::PhongTiles`].
+    pub(super) tiles: Tiles,
     /// Time per pixel handed over to the caller.
     pub(super) presenting: LearnedRate,
     pub(super) frames: u64,
@@ -69,6 +72,7 @@ impl Renderer {
             is_lit: false,
             refinement: Refinement::default(),
             refine_first: RefineFirst::default(),
+            tiles: Tiles::default(),
             presenting: LearnedRate::new(cost::PRESENT_PIXEL_NS, LEAST_PIXELS_TO_LEARN_FROM),
             frames: 0,
             handed_over: VecDeque::with_capacity(MOST_AGE),
@@ -135,6 +139,9 @@ impl Renderer {
         };
         self.base.report(&mut stats);
         self.refinement.report(self.method, &mut stats);
+        if self.method == Method::PhongTiles {
+            self.tiles.report(&mut stats);
+        }
         if is_seen {
             stats.skipped.visibility_pixels = stats.covered_pixels;
         }
@@ -146,9 +153,20 @@ impl Renderer {
 
     /// Whether the image of the view last seen is final, once it is lit.
     fn has_converged(&self) -> bool {
+        if self.method == Method::PhongTiles {
+            return self.tiles.is_finished();
+        }
         !self.method.is_progressive()
             || (self.refinement.is_finished()
                 && (!self.refines_first() || self.refine_first.is_up_to_date(&self.refinement)))
+    }
+
+    /// How the image lit last is shaded by now, as far as whole triangles are concerned.
+    pub(super) fn shown_method(&self) -> Method {
+        match self.method {
+            Method::PhongTiles if self.tiles.is_finished() => Method::Phong,
+            method => method,
+        }
     }
 
     /// Whether a frame has enough to do to share it among threads. Not so where nothing has changed and nothing is left to be
@@ -254,7 +272,7 @@ impl Renderer {
         lap(&mut stages.resolve);
 
         // Which triangles can hold a highlight, and what is worth refining?
-        if self.method.is_progressive() {
+        if self.method.refines_triangles() {
             self.base.classify(exec, &self.world, view, backend);
             self.refinement.collect_candidates(
                 exec,
@@ -266,6 +284,15 @@ impl Renderer {
             );
         } else {
             self.refinement.clear();
+        }
+        if self.method == Method::PhongTiles {
+            self.tiles.begin(&super::refinement::Stage {
+                exec,
+                world: &self.world,
+                view,
+                base: &self.base,
+                backend,
+            });
         }
         lap(&mut stages.classify);
 
@@ -307,7 +334,11 @@ impl Renderer {
         loop {
             let pending = stage.backend.pending_pixels(target);
             allowance.reserve_ms(self.presenting.predict_ms(pending) + MARGIN_MS);
-            if !self.refinement.step(&mut stage, allowance) {
+            let has_gone_on = match self.method {
+                Method::PhongTiles => self.tiles.step(&mut stage, allowance),
+                _ => self.refinement.step(&mut stage, allowance),
+            };
+            if !has_gone_on {
                 return None;
             }
         }

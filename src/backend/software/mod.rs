@@ -30,6 +30,7 @@ mod repaint;
 mod resolve;
 mod setup;
 mod shares;
+mod squares;
 mod tile;
 mod transform;
 mod visible;
@@ -47,6 +48,9 @@ use resolve::Painter;
 use shares::Shares;
 use std::fmt;
 use tile::{Grid, TILE_SIDE, Tile};
+
+// Its squares are our tiles.
+const _: () = assert!(TILE_SIDE == super::SQUARE_SIDE as usize);
 use transform::Vertices;
 use visible::Visible;
 
@@ -259,6 +263,22 @@ impl Backend for SoftwareBackend {
         for job in &self.jobs {
             patches[job.patch as usize].pixels += job.pixels;
         }
+    }
+
+    fn square_pixels(&self, square: u32) -> u32 {
+        self.tiles
+            .get(square as usize)
+            .map_or(0, |tile| tile.covered)
+    }
+
+    fn shade_squares(&mut self, exec: Exec, geometry: Geometry<'_>, squares: &[u32]) {
+        self.serial += 1;
+        let painter = Painter {
+            geometry,
+            shares: &self.shares,
+            serial: self.serial,
+        };
+        squares::shade(exec, &mut self.tiles, &painter, squares);
     }
 
     fn pending_pixels(&self, target: &Target<'_>) -> u64 {
