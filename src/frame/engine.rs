@@ -159,7 +159,7 @@ impl Engine {
 
     /// Calls `f` with everything that the current image consists of: visible triangles, or the leaves and parts that
     /// they were divided into. Nothing before the first frame, and after [`forget`](Self::forget). With
-    /// [`Method::PhongTiles`] triangles are interpolated until all pixels are shaded.
+    /// [`Method::PhongTiles`](super::Method::PhongTiles) triangles are interpolated until all pixels are shaded.
     pub fn for_each_leaf(&self, f: impl FnMut(&Leaf)) {
         let r = &self.renderer;
         if r.seen.is_some() && r.is_lit {
