@@ -103,6 +103,7 @@ impl Comparison {
             budget: self.budget,
             calibration: self.calibration.as_ref(),
             facts: &self.facts,
+            warning: self.noise.as_ref().and_then(noise_warning),
         };
         Ok(sheet.draw().save_png(&args.output)?)
     }

@@ -44,8 +44,8 @@ const SEAM: u32 = 4;
 const NARROWEST: u32 = 470;
 /// Room for the scale and its texts.
 const LOWEST: u32 = 150;
-/// Most cells in a row.
-const COLUMNS: usize = 3;
+/// How many cells there may be in a row, the best number first where it makes no difference.
+const COLUMNS: [usize; 2] = [3, 4];
 
 /// A method's image.
 #[derive(Debug)]
@@ -65,6 +65,8 @@ pub(super) struct Sheet<'a> {
     pub(super) budget: SweepBudget,
     pub(super) calibration: Option<&'a Calibration>,
     pub(super) facts: &'a Facts,
+    /// Why times are not to be trusted, if so.
+    pub(super) warning: Option<String>,
 }
 
 /// Where things are on the sheet, in pixels.
@@ -82,7 +84,10 @@ impl Layout {
         let [width, height] = reduction.shown();
         Self {
             reduction,
-            columns: cells.clamp(1, COLUMNS),
+            columns: COLUMNS
+                .into_iter()
+                .min_by_key(|columns| cells.next_multiple_of(*columns))
+                .map_or(1, |columns| columns.min(cells.max(1))),
             cell: [width.max(NARROWEST), height.max(LOWEST)],
         }
     }
@@ -156,7 +161,13 @@ impl Sheet<'_> {
                 ..SMALL
             },
         );
-        canvas.text([GAP, GAP + 50], &self.facts.line(), SMALL);
+        let facts = self.facts.line();
+        canvas.text([GAP, GAP + 50], &facts, SMALL);
+        if let Some(warning) = &self.warning {
+            let color = LATE_INK;
+            let beside = [2 * GAP + SMALL.width(&facts), GAP + 50];
+            canvas.text(beside, warning, TextStyle { color, ..SMALL });
+        }
     }
 
     /// The reference, and the scale of errors.
@@ -253,6 +264,13 @@ fn draw_image(canvas: &mut Canvas, layout: &Layout, corner: [u32; 2], frame: &Fr
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_are_as_full_as_they_can_be() {
+        let columns =
+            [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|cells| Layout::new([9, 9], cells).columns);
+        assert_eq!(columns, [1, 1, 2, 3, 4, 3, 3, 4, 4, 3]);
+    }
 
     #[test]
     fn cells_lie_inside_the_sheet_and_apart() {
