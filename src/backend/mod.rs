@@ -43,6 +43,9 @@ pub fn new_writer() -> u64 {
     WRITERS.fetch_add(1, Ordering::Relaxed)
 }
 
+/// Width and height, in pixels, of the squares that [`Backend::shade_squares`] shades.
+pub const SQUARE_SIDE: u32 = 64;
+
 /// What a backend can do beyond drawing Gouraud triangles, and how it draws those.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capabilities {
@@ -258,6 +261,22 @@ pub trait Backend: Debug + Send {
     /// implement it.
     fn repaint(&mut self, exec: Exec, geometry: Geometry<'_>, patches: &mut [Patch]) {
         let _ = (exec, geometry, patches);
+    }
+
+    /// How many covered pixels there are in a square of [`SQUARE_SIDE`] x [`SQUARE_SIDE`] pixels; squares are numbered row after
+    /// row from the top left, those at the right and lower edges being cut. Asked only where the next is called.
+    fn square_pixels(&self, square: u32) -> u32 {
+        let _ = square;
+        0
+    }
+
+    /// Gives the pixels of some squares the colours that resolving with [`BasePaint::Phong`] gives them. The image has been
+    /// resolved before, and no square is named twice.
+    ///
+    /// Never called on a backend that does not [refine in place](Capabilities::refines_in_place), which need not
+    /// implement it.
+    fn shade_squares(&mut self, exec: Exec, geometry: Geometry<'_>, squares: &[u32]) {
+        let _ = (exec, geometry, squares);
     }
 
     /// How many pixels [`present`](Self::present) would have to write to `target` now.

@@ -45,6 +45,11 @@ pub enum Call {
         /// Pixels painted, as counted.
         pixels: u64,
     },
+    /// [`Backend::shade_squares`].
+    ShadeSquares {
+        /// Which.
+        squares: Vec<u32>,
+    },
     /// [`Backend::present`].
     Present {
         /// Pixels written.
@@ -178,6 +183,17 @@ impl Backend for RecordingBackend {
         self.log.push(Call::Repaint {
             patches: patches.len(),
             pixels: patches.iter().map(|patch| u64::from(patch.pixels)).sum(),
+        });
+    }
+
+    fn square_pixels(&self, square: u32) -> u32 {
+        self.inner.square_pixels(square)
+    }
+
+    fn shade_squares(&mut self, exec: Exec, geometry: Geometry<'_>, squares: &[u32]) {
+        self.inner.shade_squares(exec, geometry, squares);
+        self.log.push(Call::ShadeSquares {
+            squares: squares.to_vec(),
         });
     }
 

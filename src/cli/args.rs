@@ -11,6 +11,7 @@ use specula::scene::Scene;
 use specula::schedule::Budget;
 use specula::simd::SimdLevel;
 use std::path::Path;
+use std::str::FromStr;
 
 /// Most pixels of an image.
 const MAX_PIXELS: u64 = 1 << 26;
@@ -127,6 +128,46 @@ pub(super) fn count(text: &str) -> Result<u32, String> {
         Ok(0) | Err(_) => Err(format!("it must be a whole number from 1 to {}", u32::MAX)),
         Ok(count) => Ok(count),
     }
+}
+
+/// A fraction of the way from one time to another, or beyond.
+pub(super) fn fraction(text: &str) -> Result<f64, String> {
+    not_negative(text).ok_or_else(|| "a fraction is a number, 0 or more".to_owned())
+}
+
+/// A method, or all of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum MethodOrAll {
+    All,
+    One(Method),
+}
+
+impl FromStr for MethodOrAll {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "all" => Ok(Self::All),
+            _ => text.parse().map(Self::One),
+        }
+    }
+}
+
+/// The methods named, each once, in the order given.
+pub(super) fn selected(named: &[MethodOrAll]) -> Vec<Method> {
+    let mut methods = Vec::new();
+    for item in named {
+        let group = match item {
+            MethodOrAll::All => &Method::ALL[..],
+            MethodOrAll::One(method) => std::slice::from_ref(method),
+        };
+        for &method in group {
+            if !methods.contains(&method) {
+                methods.push(method);
+            }
+        }
+    }
+    methods
 }
 
 fn threads(text: &str) -> Result<usize, String> {

@@ -3,6 +3,7 @@
 use super::Failure;
 use super::animate::{self, Animate};
 use super::bench::{self, Bench};
+use super::compare::{self, Compare};
 use super::inspect::{self, Inspect};
 use super::render::{self, Render};
 use super::sweep::{self, Sweep};
@@ -16,7 +17,8 @@ Examples:
   specula render scenes/teapot.ron -o teapot.png
   specula render scenes/teapot.ron -o teapot.png --budget 2 --frames 8
   specula animate scenes/turntable.ron -o turntable.apng --budget 4
-  specula sweep scenes/teapot.ron --methods all --csv teapot.csv
+  specula sweep scenes/teapot.ron --methods all --repeat 9 --svg teapot.svg
+  specula compare scenes/closeup.ron -o sheet.png
   specula bench scenes/teapot.ron --budget 4
   specula inspect scenes/teapot.ron --budget 2 --overlay overlay.png
 
@@ -35,6 +37,8 @@ enum Command {
     Animate(Animate),
     /// Measure error against time: methods x budgets, every row from a cold engine
     Sweep(Sweep),
+    /// Show all methods at the same time side by side, with maps of their errors, on one sheet
+    Compare(Compare),
     /// Measure frame times over views from all around a scene
     Bench(Bench),
     /// Say what a view consists of, and draw it over the image
@@ -48,6 +52,7 @@ impl Arguments {
             Command::Render(args) => render::run(args),
             Command::Animate(args) => animate::run(args),
             Command::Sweep(args) => sweep::run(args),
+            Command::Compare(args) => compare::run(args),
             Command::Bench(args) => bench::run(args),
             Command::Inspect(args) => inspect::run(args),
         }

@@ -7,6 +7,7 @@ mod animate;
 mod args;
 mod bench;
 mod command;
+mod compare;
 mod console;
 mod inspect;
 mod log;

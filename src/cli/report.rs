@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 use specula::frame::{FrameStats, Outcome};
-use specula::measure::ErrorReport;
+use specula::measure::{ErrorReport, Noise};
 use specula::schedule::Budget;
 
 /// What a counter of skipped things is called on the screen.
@@ -195,6 +195,30 @@ fn measured(error: &ErrorReport) -> String {
         error.share_above_4 * 100.0,
         error.excluded_pixels
     )
+}
+
+/// Why times are not to be trusted, if so.
+pub(super) fn noise_warning(noise: &Noise) -> Option<String> {
+    let percent = |share: f64| share * 100.0;
+    let mut reasons = Vec::new();
+    if noise.spread > Noise::MOST_SPREAD {
+        reasons.push(format!(
+            "quartiles {:.0} % apart (limit {:.0} %)",
+            percent(noise.spread),
+            percent(Noise::MOST_SPREAD)
+        ));
+    }
+    if noise.drift > Noise::MOST_DRIFT {
+        reasons.push(format!(
+            "medians changed by {:.1} % (limit {:.0} %)",
+            percent(noise.drift),
+            percent(Noise::MOST_DRIFT)
+        ));
+    }
+    (!reasons.is_empty()).then(|| {
+        let reasons = list(reasons);
+        format!("machine too noisy to trust these times: {reasons}")
+    })
 }
 
 pub(super) fn list(items: impl IntoIterator<Item = String>) -> String {

@@ -226,7 +226,8 @@ impl Engine {
     }
 
     /// Calls `f` with everything that the current image consists of: visible triangles, or the leaves and parts that
-    /// they were divided into. Nothing before the first frame, and after [`forget`](Self::forget).
+    /// they were divided into. Nothing before the first frame, and after [`forget`](Self::forget). With
+    /// [`Method::PhongTiles`](super::Method::PhongTiles) triangles are interpolated until all pixels are shaded.
     pub fn for_each_leaf(&self, f: impl FnMut(&Leaf)) {
         let Renderer {
             method,
@@ -241,7 +242,8 @@ impl Engine {
                 refinement,
                 ..
             } = picture;
-            for_each_leaf(*method, world, base, &**backend, refinement, f);
+            let method = picture.shown_method(*method);
+            for_each_leaf(method, world, base, &**backend, refinement, f);
         }
     }
 

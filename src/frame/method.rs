@@ -19,6 +19,9 @@ pub enum Method {
     /// Gouraud first, then per-pixel Phong, triangles with most visible pixels first: the simple rival of
     /// [`Adaptive`](Self::Adaptive).
     PhongArea,
+    /// Gouraud first, then per-pixel Phong, squares of the image in a fixed shuffled order: a rival of
+    /// [`Adaptive`](Self::Adaptive) that knows nothing of the scene.
+    PhongTiles,
     /// The illumination equation at every pixel of an image of half the width and height, which is enlarged: the simple rival
     /// that is there in a quarter of the time.
     PhongHalf,
@@ -26,12 +29,13 @@ pub enum Method {
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Flat,
         Self::Gouraud,
         Self::Phong,
         Self::Adaptive,
         Self::PhongArea,
+        Self::PhongTiles,
         Self::PhongHalf,
     ];
 
@@ -44,6 +48,7 @@ impl Method {
             Self::Phong => "phong",
             Self::Adaptive => "adaptive",
             Self::PhongArea => "phong-area",
+            Self::PhongTiles => "phong-tiles",
             Self::PhongHalf => "phong-half",
         }
     }
@@ -60,10 +65,15 @@ impl Method {
         matches!(self, Self::Phong | Self::PhongHalf)
     }
 
+    /// Whether refinement takes triangles one by one, best first.
+    pub(super) fn refines_triangles(self) -> bool {
+        matches!(self, Self::Adaptive | Self::PhongArea)
+    }
+
     /// Whether frames go on refining the image, so that a budget makes a difference.
     #[must_use]
     pub fn is_progressive(self) -> bool {
-        matches!(self, Self::Adaptive | Self::PhongArea)
+        self.refines_triangles() || self == Self::PhongTiles
     }
 }
 

@@ -17,6 +17,7 @@ mod refinement;
 mod renderer;
 mod shelf;
 mod stats;
+mod tiles;
 
 pub use engine::Engine;
 pub use method::Method;

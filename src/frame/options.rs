@@ -116,6 +116,6 @@ pub(super) fn suits(method: Method, backend: &dyn Backend) -> bool {
     match method {
         Method::Flat | Method::Gouraud | Method::Adaptive => true,
         Method::Phong | Method::PhongHalf => capabilities.per_pixel,
-        Method::PhongArea => capabilities.refines_in_place(),
+        Method::PhongArea | Method::PhongTiles => capabilities.refines_in_place(),
     }
 }

@@ -20,7 +20,8 @@ use super::base::BaseImage;
 use super::load::{self, ImageLoad};
 use super::refine_first::RefineFirst;
 use super::refinement::{Refinement, Stage};
-use super::stats::StageTimes;
+use super::stats::{FrameStats, StageTimes};
+use super::tiles::Tiles;
 use crate::backend::Backend;
 use crate::output::Target;
 use crate::parallel::{Exec, GoOn, Turn};
@@ -47,6 +48,8 @@ pub(super) struct Picture {
     pub(super) refinement: Refinement,
     /// For a backend that cannot repaint.
     pub(super) refine_first: RefineFirst,
+    /// For [`Method::PhongTiles`].
+    tiles: Tiles,
     /// What it shows, or will when it is done.
     view: Option<View>,
     /// One pixel stands for `divisor` by `divisor` pixels of the target.
@@ -108,6 +111,7 @@ impl Picture {
             base: BaseImage::default(),
             refinement: Refinement::default(),
             refine_first: RefineFirst::default(),
+            tiles: Tiles::default(),
             view: None,
             divisor: 1,
             pass: Pass::Empty,
@@ -179,10 +183,30 @@ impl Picture {
 
     /// Whether the image is final, once its first one is complete.
     pub(super) fn has_converged(&self, method: Method) -> bool {
+        if method == Method::PhongTiles {
+            return self.tiles.is_finished();
+        }
         !method.is_progressive()
             || (self.refinement.is_finished()
                 && (!self.refines_first(method)
                     || self.refine_first.is_up_to_date(&self.refinement)))
+    }
+
+    /// How it is shaded by now, as far as whole triangles are concerned.
+    pub(super) fn shown_method(&self, method: Method) -> Method {
+        match method {
+            Method::PhongTiles if self.tiles.is_finished() => Method::Phong,
+            method => method,
+        }
+    }
+
+    /// Fills in what the image consists of, and how far it has come.
+    pub(super) fn report(&self, method: Method, stats: &mut FrameStats) {
+        self.base.report(stats);
+        self.refinement.report(method, stats);
+        if method == Method::PhongTiles {
+            self.tiles.report(stats);
+        }
     }
 
     /// Whether everything is drawn once, after refinement.
@@ -309,11 +333,17 @@ impl Picture {
                 false,
             );
             allowance.reserve_ms(presenting_ms);
-            let kind = refinement.next_kind();
+            let kind = match easel.method {
+                Method::PhongTiles => Kind::Paint,
+                _ => refinement.next_kind(),
+            };
             let ms_per_unit = easel.costs.predict_at_most_ms(kind, Load::of_items(1.0));
             allowance.set_ms_per_unit(ms_per_unit);
             let done_ns = allowance.nominal_ns();
-            let is_done = refinement.step(&mut stage, allowance);
+            let is_done = match easel.method {
+                Method::PhongTiles => self.tiles.step(&mut stage, allowance),
+                _ => refinement.step(&mut stage, allowance),
+            };
             let load = Load::of_items((allowance.nominal_ns() - done_ns) as f64);
             let now = allowance.elapsed_ms();
             easel.book(kind, load, now - since);
@@ -329,7 +359,10 @@ impl Picture {
     }
 
     fn begin_refinement(&mut self, studio: &Studio<'_>, allowance: &Allowance<'_>, view: &View) {
-        if !studio.method.is_progressive() {
+        if studio.method == Method::PhongTiles {
+            self.tiles.begin(view, &*self.backend);
+        }
+        if !studio.method.refines_triangles() {
             return self.refinement.clear();
         }
         self.refinement.set_remembering(allowance.is_timed());

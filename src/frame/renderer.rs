@@ -489,8 +489,7 @@ impl Renderer {
             stats.divisor = picture.divisor;
             // An image that is being drawn anew, though its colours still are the old ones, has lost what was known about it.
             if picture.view().is_some() {
-                picture.base.report(&mut stats);
-                picture.refinement.report(self.method, &mut stats);
+                picture.report(self.method, &mut stats);
                 stats.converged = picture.has_converged(self.method)
                     && picture.divisor == self.method.divisor().unwrap_or(1);
             }

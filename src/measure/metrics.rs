@@ -67,23 +67,7 @@ impl ErrorReport {
     /// # Errors
     /// When the sizes or the encodings differ.
     pub fn compare(frame: &Frame, reference: &ReferenceImage) -> Result<Self, Mismatch> {
-        let [own, other] = [
-            [frame.width(), frame.height()],
-            [reference.width, reference.height],
-        ];
-        if own != other {
-            return Err(Mismatch::Size {
-                frame: own,
-                reference: other,
-            });
-        }
-        let [own, other] = [frame.encoding(), reference.encoding];
-        if own != other {
-            return Err(Mismatch::Encoding {
-                frame: own,
-                reference: other,
-            });
-        }
+        check_same_kind(frame, reference)?;
         Ok(Self::of_same_kind(frame, reference))
     }
 
@@ -93,6 +77,28 @@ impl ErrorReport {
         histogram.add_image(frame, reference);
         histogram.report()
     }
+}
+
+/// Whether `frame` can be compared with `reference`.
+pub(super) fn check_same_kind(frame: &Frame, reference: &ReferenceImage) -> Result<(), Mismatch> {
+    let [own, other] = [
+        [frame.width(), frame.height()],
+        [reference.width, reference.height],
+    ];
+    if own != other {
+        return Err(Mismatch::Size {
+            frame: own,
+            reference: other,
+        });
+    }
+    let [own, other] = [frame.encoding(), reference.encoding];
+    if own != other {
+        return Err(Mismatch::Encoding {
+            frame: own,
+            reference: other,
+        });
+    }
+    Ok(())
 }
 
 /// Collects differences pixel by pixel, in constant memory.
@@ -192,7 +198,7 @@ impl ErrorHistogram {
 }
 
 /// `part / whole`, or zero when there is no whole.
-fn ratio(part: u64, whole: u64) -> f64 {
+pub(super) fn ratio(part: u64, whole: u64) -> f64 {
     if whole == 0 {
         0.0
     } else {
@@ -201,12 +207,12 @@ fn ratio(part: u64, whole: u64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::measure::reference::NO_TRIANGLE;
 
     /// A reference of `width` covered pixels in one row, all of colour (100, 100, 100).
-    fn row(width: u32) -> ReferenceImage {
+    pub(in crate::measure) fn row(width: u32) -> ReferenceImage {
         let len = width as usize;
         ReferenceImage {
             width,
@@ -219,7 +225,7 @@ mod tests {
         }
     }
 
-    fn frame_of(reference: &ReferenceImage) -> Frame {
+    pub(in crate::measure) fn frame_of(reference: &ReferenceImage) -> Frame {
         let mut frame = Frame::new(reference.width, reference.height);
         for (pixel, &[r, g, b]) in frame.pixels_mut().iter_mut().zip(&reference.pixels) {
             *pixel = [r, g, b, 255];

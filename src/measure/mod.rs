@@ -2,6 +2,8 @@
 //! against time, and looking into an image.
 
 pub mod bench;
+pub mod error_map;
+pub mod flicker;
 pub mod inspection;
 pub mod metrics;
 pub mod overlay;
@@ -9,8 +11,12 @@ pub mod reference;
 pub mod sweep;
 
 pub use bench::{BenchOptions, BenchPhase, BenchReport, bench};
+pub use error_map::error_map;
+pub use flicker::flicker;
 pub use inspection::Inspection;
 pub use metrics::{ErrorHistogram, ErrorReport, Mismatch};
 pub use overlay::{Layer, draw_overlay};
 pub use reference::ReferenceImage;
-pub use sweep::{Calibration, Sweep, SweepBudget, SweepOptions, SweepRow};
+pub use sweep::{
+    Calibration, Curve, CurveArea, CurvePoint, Noise, Sweep, SweepBudget, SweepOptions, SweepRow,
+};

@@ -34,6 +34,7 @@ mod repaint;
 mod resolve;
 mod setup;
 mod shares;
+mod squares;
 mod stages;
 mod tile;
 mod transform;
@@ -54,6 +55,9 @@ use shares::Shares;
 use stages::Stage;
 use std::fmt;
 use tile::{Grid, TILE_SIDE, Tile};
+
+// Its squares are our tiles.
+const _: () = assert!(TILE_SIDE == super::SQUARE_SIDE as usize);
 use transform::Vertices;
 use visible::Visible;
 
@@ -236,6 +240,22 @@ impl Backend for SoftwareBackend {
         for job in &self.jobs {
             patches[job.patch as usize].pixels += job.pixels;
         }
+    }
+
+    fn square_pixels(&self, square: u32) -> u32 {
+        self.tiles
+            .get(square as usize)
+            .map_or(0, |tile| tile.covered)
+    }
+
+    fn shade_squares(&mut self, exec: Exec, geometry: Geometry<'_>, squares: &[u32]) {
+        self.serial += 1;
+        let painter = Painter {
+            geometry,
+            shares: &self.shares,
+            serial: self.serial,
+        };
+        squares::shade(exec, &mut self.tiles, &painter, squares);
     }
 
     fn pending_pixels(&self, target: &Target<'_>) -> u64 {

@@ -27,6 +27,10 @@ continued; --overwrite renders them anew. Files get their names when they are co
 Without --budget and --work every frame refines until it equals per-pixel Phong shading. Then, and
 with --work, a frame is the same whichever others are rendered before it.
 
+With --error, flicker is the root mean square change of the error from a frame to the next, in codes,
+over the pixels that the scene covers in both: an error that stays does not flicker. The references
+put threads to sleep, so frame times are longer than without.
+
 Examples:
   A film for a web page:
     specula animate scenes/turntable.ron -o turntable.apng --size 480x270 --fps 15
@@ -34,6 +38,8 @@ Examples:
     specula animate scenes/turntable.ron -o - --budget 4 | ffmpeg -i - turntable.mp4
   One of 8 parts on a cluster, in a job array numbered from 1 to 8:
     specula animate scenes/turntable.ron -o frames/####.png --shard $SLURM_ARRAY_TASK_ID/8
+  Does the error flicker at 4 ms a frame?
+    specula animate scenes/turntable.ron -o film.apng --budget 4 --size 640x360 --error
   Frame times for a script:
     specula animate scenes/turntable.ron -o film.apng --budget 4 --json | jq .frame_ms")]
 pub(in crate::cli) struct Animate {
@@ -62,7 +68,7 @@ pub(in crate::cli) struct Animate {
     #[arg(long, value_name = "UNITS", conflicts_with = "budget")]
     pub(super) work: Option<u64>,
 
-    /// How to shade: flat, gouraud, phong, adaptive or phong-area
+    /// How to shade: flat, gouraud, phong, adaptive, phong-area or phong-tiles
     #[arg(long, default_value_t)]
     pub(super) method: Method,
 
@@ -73,6 +79,10 @@ pub(in crate::cli) struct Animate {
     /// Render numbered frames anew that are there already
     #[arg(long)]
     pub(super) overwrite: bool,
+
+    /// Compare every frame with its Phong reference (which takes a while), and measure the flicker of the error
+    #[arg(long)]
+    pub(super) error: bool,
 
     /// Print one JSON object per frame; the summary then goes to standard error
     #[arg(long)]

@@ -1,6 +1,7 @@
 //! `specula animate`: the scene's animation as a film, each frame under a budget.
 
 mod args;
+mod error;
 mod film;
 mod summary;
 
@@ -10,6 +11,7 @@ use super::Failure;
 use super::args::budget;
 use super::console::{Output, Progress, note};
 use super::report::frame_json;
+use error::{Comparison, Measured};
 use film::{Destination, Film};
 use serde_json::json;
 use specula::frame::FrameStats;
@@ -150,8 +152,9 @@ impl Job<'_> {
             .create(size.width, size.height, &self.timing)?;
         let steps = plan.iter().filter(|planned| !planned.keep).count();
         let progress = Progress::frames(steps as u64);
+        let mut comparison = args.error.then(Comparison::default);
         for planned in plan {
-            let stats = if planned.keep {
+            let rendered = if planned.keep {
                 self.summary.kept();
                 None
             } else {
@@ -166,11 +169,18 @@ impl Job<'_> {
                 }
                 self.summary
                     .rendered(stats.frame_ms, budget, stats.estimated_error);
+                let measured = comparison
+                    .as_mut()
+                    .map(|c| c.measure(planned.number, &engine, &self.scene, &frame))
+                    .transpose()?;
+                if let Some(measured) = &measured {
+                    self.summary.measured(measured);
+                }
                 progress.step();
-                Some(stats)
+                Some((stats, measured))
             };
             if args.json {
-                let line = self.json(planned, stats.as_ref());
+                let line = self.json(planned, rendered.as_ref());
                 progress.suspend(|| self.output.line(&line))?;
             }
         }
@@ -185,12 +195,16 @@ impl Job<'_> {
     }
 
     /// One object for a frame; one that was kept has no statistics.
-    fn json(&self, planned: &Planned, stats: Option<&FrameStats>) -> String {
-        let mut object = match stats {
-            Some(stats) => frame_json(planned.number, stats),
+    fn json(&self, planned: &Planned, rendered: Option<&(FrameStats, Option<Measured>)>) -> String {
+        let mut object = match rendered {
+            Some((stats, _)) => frame_json(planned.number, stats),
             None => json!({ "frame": planned.number }),
         };
         if let Some(object) = object.as_object_mut() {
+            if let Some((_, Some(measured))) = rendered {
+                object.insert("error".to_owned(), json!(measured.error));
+                object.insert("flicker".to_owned(), json!(measured.flicker));
+            }
             let file = self.destination.file(planned.number);
             object.insert("time_s".to_owned(), json!(self.seconds(planned.number)));
             object.insert("kept".to_owned(), json!(planned.keep));

@@ -1,5 +1,6 @@
 //! What is said of a film when it is done.
 
+use super::error::Measured;
 use specula::schedule::Budget;
 use std::time::Duration;
 
@@ -11,6 +12,9 @@ pub(super) struct Summary {
     late: u32,
     /// Sum and number of the estimated errors that are known.
     error: (f64, u32),
+    /// Sums of squares of measured errors and of flickers, in codes, and how many there are of each.
+    squared_errors: (f64, u32),
+    squared_flickers: (f64, u32),
     /// Frames that were there already.
     kept: u32,
     budget_ms: Option<f64>,
@@ -27,6 +31,16 @@ impl Summary {
         if estimated_error.is_finite() {
             self.error.0 += estimated_error;
             self.error.1 += 1;
+        }
+    }
+
+    /// Takes in what was measured of a frame.
+    pub(super) fn measured(&mut self, measured: &Measured) {
+        self.squared_errors.0 += measured.error.rmse.powi(2);
+        self.squared_errors.1 += 1;
+        if let Some(flicker) = measured.flicker {
+            self.squared_flickers.0 += flicker.powi(2);
+            self.squared_flickers.1 += 1;
         }
     }
 
@@ -51,6 +65,18 @@ impl Summary {
             let mean = self.error.0 / f64::from(self.error.1);
             lines.push(format!(
                 "  error      about {mean:.2} codes (mean of the estimates)"
+            ));
+        }
+        let root_mean = |(sum, count): (f64, u32)| (sum / f64::from(count)).sqrt();
+        if self.squared_errors.1 > 0 {
+            let flicker = if self.squared_flickers.1 > 0 {
+                format!(", flicker {:.3} codes", root_mean(self.squared_flickers))
+            } else {
+                String::new()
+            };
+            lines.push(format!(
+                "  measured   rmse {:.3} codes{flicker} (root mean squares over the frames)",
+                root_mean(self.squared_errors)
             ));
         }
         if self.kept > 0 {
@@ -122,12 +148,18 @@ mod tests {
         for (frame_ms, estimated_error) in [(3.0, 0.5), (5.0, f64::NAN), (4.0, 1.5)] {
             summary.rendered(frame_ms, Budget::Millis(4.0), estimated_error);
         }
+        for (rmse, flicker) in [(3.0, None), (4.0, Some(1.0))] {
+            let mut error = specula::measure::ErrorHistogram::default().report();
+            error.rmse = rmse;
+            summary.measured(&Measured { error, flicker });
+        }
         summary.kept();
         assert_eq!(
             summary.text([8, 6], Duration::from_secs(2)),
             "3 frames of 8x6 in 2.0 s, 1.5 a second\n  \
              rendering  median 4.00 ms, p99 5.00 ms, longest 5.00 ms a frame; budget 4.00 ms: 1 late\n  \
              error      about 1.00 codes (mean of the estimates)\n  \
+             measured   rmse 3.536 codes, flicker 1.000 codes (root mean squares over the frames)\n  \
              kept       1 frame that was there already (--overwrite renders them anew)"
         );
         assert_eq!(

@@ -62,7 +62,7 @@ impl Leaf {
     }
 }
 
-/// Calls `f` with everything that the image of a progressive method consists of, or else with its visible triangles.
+/// Calls `f` with everything that the image of a method that refines triangles consists of, or else with its visible triangles.
 pub(in crate::frame) fn for_each_leaf(
     method: Method,
     world: &World,
@@ -71,7 +71,7 @@ pub(in crate::frame) fn for_each_leaf(
     refinement: &Refinement,
     mut f: impl FnMut(&Leaf),
 ) {
-    if method.is_progressive() {
+    if method.refines_triangles() {
         let visible = backend.visible_triangles();
         let rest = visible.get(refinement.roots.len()..).unwrap_or_default();
         refinement.for_each_leaf(world, base.colours(), &mut f);

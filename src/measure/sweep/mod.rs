@@ -5,10 +5,19 @@
 //!
 //! Budgets that mean something on any machine are written `G + f (P - G)`, with `G` and `P` the times of a Gouraud and a
 //! Phong frame in the same run: `f = 0` buys Gouraud shading, `f = 1` Phong shading everywhere. Both are
-//! [medians](Calibration) of frames that alternate, so that a change of the machine's speed meets both.
+//! [medians](Calibration) of frames that alternate, so that a change of the machine's speed meets both. They are measured again
+//! during and after the sweep: the difference tells whether the machine was too [noisy](Noise).
 //!
 //! Of several repetitions the row with the median frame time is kept whole, so that time and error belong together (of
 //! an even number, the faster of the two in the middle).
+
+mod calibration;
+mod curve;
+mod row;
+
+pub use calibration::{Calibration, Noise};
+pub use curve::{Curve, CurveArea, CurvePoint};
+pub use row::SweepRow;
 
 use super::{ErrorReport, ReferenceImage};
 use crate::backend::BackendKind;
@@ -18,7 +27,7 @@ use crate::output::{Encoding, Frame};
 use crate::scene::Scene;
 use crate::schedule::Budget;
 use crate::simd::SimdLevel;
-use serde::Serialize;
+use calibration::Calibrator;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -85,27 +94,6 @@ impl SweepOptions {
     }
 }
 
-/// The times that budgets are scaled by, in milliseconds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Calibration {
-    /// Median time `G` of a Gouraud-shaded frame.
-    pub gouraud_ms: f64,
-    /// Median time `P` of a Phong-shaded frame.
-    pub phong_ms: f64,
-}
-
-impl Calibration {
-    /// The budget `G + f (P - G)`; `G` where Phong shading was not slower.
-    #[must_use]
-    pub fn budget(&self, fraction: f64) -> SweepBudget {
-        let extra = (self.phong_ms - self.gouraud_ms).max(0.0);
-        SweepBudget {
-            millis: self.gouraud_ms + fraction * extra,
-            fraction: Some(fraction),
-        }
-    }
-}
-
 /// One budget of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SweepBudget {
@@ -126,80 +114,6 @@ impl SweepBudget {
     }
 }
 
-/// What was measured of one frame.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SweepRow {
-    /// What the scene is called.
-    pub scene: String,
-    /// The method's name.
-    pub method: &'static str,
-    /// The budget in milliseconds.
-    pub budget_ms: f64,
-    /// The budget as a fraction of the way from Gouraud to Phong shading, if it was given so.
-    pub fraction: Option<f64>,
-    /// The frame of the still view, counted from 1.
-    pub frame: u32,
-    /// How long the frame took.
-    pub frame_ms: f64,
-    /// `frame_ms - budget_ms`.
-    pub overshoot_ms: f64,
-    /// Its error.
-    #[serde(flatten)]
-    pub error: ErrorReport,
-    /// Triangles subdivided so far.
-    pub triangles_subdivided: u64,
-    /// Whether the image is final.
-    pub converged: bool,
-}
-
-impl SweepRow {
-    /// Names of the columns of [`to_csv`](Self::to_csv).
-    pub const CSV_HEADER: &'static str = "scene,method,budget_ms,fraction,frame,frame_ms,overshoot_ms,rmse,psnr_db,\
-        max,p99,share_above_1,share_above_4,triangles_subdivided,converged,covered_pixels,excluded_pixels";
-
-    /// The row as a line of comma-separated values, without a line end; what is infinite or not there is empty.
-    #[must_use]
-    pub fn to_csv(&self) -> String {
-        let number = |value: f64| {
-            if value.is_finite() {
-                format!("{value:.4}")
-            } else {
-                String::new()
-            }
-        };
-        let error = &self.error;
-        [
-            quoted(&self.scene),
-            self.method.to_owned(),
-            number(self.budget_ms),
-            self.fraction.map_or_else(String::new, number),
-            self.frame.to_string(),
-            number(self.frame_ms),
-            number(self.overshoot_ms),
-            number(error.rmse),
-            number(error.psnr_db),
-            error.max.to_string(),
-            error.p99.to_string(),
-            format!("{:.6}", error.share_above_1),
-            format!("{:.6}", error.share_above_4),
-            self.triangles_subdivided.to_string(),
-            self.converged.to_string(),
-            error.covered_pixels.to_string(),
-            error.excluded_pixels.to_string(),
-        ]
-        .join(",")
-    }
-}
-
-/// A field of comma-separated values, in quotes if it needs them.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
-}
-
 /// Sweeps one view of a scene, from the scene's own camera.
 #[derive(Debug)]
 pub struct Sweep<'a> {
@@ -210,6 +124,7 @@ pub struct Sweep<'a> {
     engines: Vec<Engine>,
     reference: ReferenceImage,
     frame: Frame,
+    calibrator: Option<Calibrator>,
 }
 
 impl<'a> Sweep<'a> {
@@ -240,6 +155,7 @@ impl<'a> Sweep<'a> {
             frame: Frame::new(options.width, options.height),
             engines,
             options,
+            calibrator: None,
         })
     }
 
@@ -260,29 +176,27 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// When an engine cannot be made.
     pub fn calibrate(&mut self) -> Result<Calibration, EngineError> {
-        let mut engines = [
-            self.options.engine(self.scene, Method::Gouraud)?,
-            self.options.engine(self.scene, Method::Phong)?,
-        ];
-        let mut times = [Vec::new(), Vec::new()];
-        // The first round only touches memory.
-        for round in 0..=self.options.calibration_frames.max(1) {
-            for (engine, times) in engines.iter_mut().zip(&mut times) {
-                engine.forget();
-                let stats = engine.render(self.scene, Budget::Unlimited, &mut self.frame);
-                if round > 0 {
-                    times.push(stats.frame_ms);
-                }
-            }
-        }
-        let [gouraud_ms, phong_ms] = times.map(|mut times| {
-            let middle = median_index(&times, |&ms| ms);
-            times.swap_remove(middle)
-        });
-        Ok(Calibration {
-            gouraud_ms,
-            phong_ms,
-        })
+        let mut calibrator = Calibrator::new(&self.options, self.scene)?;
+        calibrator.render_gouraud(self.scene, &mut self.frame);
+        calibrator.gouraud_rmse = ErrorReport::of_same_kind(&self.frame, &self.reference).rmse;
+        calibrator.measure(self.calibration_rounds(), self.scene, &mut self.frame);
+        let calibration = calibrator.take();
+        self.calibrator = Some(calibrator);
+        Ok(calibration)
+    }
+
+    /// What [`calibrate`](Self::calibrate) would have found during [`run`](Self::run), which measures a Gouraud and a Phong
+    /// frame after each budget, and since then; `None` if there was no calibration before.
+    pub fn recalibrate(&mut self) -> Option<Calibration> {
+        let rounds = self.calibration_rounds();
+        let calibrator = self.calibrator.as_mut()?;
+        let missing = rounds.saturating_sub(calibrator.rounds());
+        calibrator.measure(missing, self.scene, &mut self.frame);
+        Some(calibrator.take())
+    }
+
+    fn calibration_rounds(&self) -> usize {
+        self.options.calibration_frames.max(1) as usize
     }
 
     /// Measures every method at every budget and hands over each row as soon as it is measured, until `on_row` breaks.
@@ -303,6 +217,34 @@ impl<'a> Sweep<'a> {
                     }
                 }
             }
+            if let Some(calibrator) = &mut self.calibrator {
+                calibrator.measure(1, self.scene, &mut self.frame);
+            }
+        }
+    }
+
+    /// Measures the first frame of every method at one budget, and hands over each row with its image as soon as it is
+    /// measured.
+    pub fn run_with_images(
+        &mut self,
+        budget: SweepBudget,
+        mut on_image: impl FnMut(SweepRow, Frame),
+    ) {
+        for method in 0..self.engines.len() {
+            self.warm_up(method);
+        }
+        for method in 0..self.engines.len() {
+            let mut images: Vec<(SweepRow, Frame)> = (0..self.options.repeats.max(1))
+                .map(|_| {
+                    self.render(method, budget, Start::Cold);
+                    let stats = self.render(method, budget, Start::Cold);
+                    let row = self.row(method, budget, 1, &stats);
+                    (row, self.frame.clone())
+                })
+                .collect();
+            let middle = median_index(&images, |(row, _)| row.frame_ms);
+            let (row, frame) = images.swap_remove(middle);
+            on_image(row, frame);
         }
     }
 
@@ -466,24 +408,47 @@ mod tests {
     }
 
     #[test]
-    fn fractions_lie_between_gouraud_and_phong() {
+    fn calibrations_before_and_after_have_the_frames_asked_for() {
         let scene = scene();
         let mut sweep = Sweep::new("teapot", &scene, options()).expect("one thread");
-        let measured = sweep.calibrate().expect("one thread");
-        assert!(measured.gouraud_ms > 0.0 && measured.phong_ms > 0.0);
+        assert_eq!(sweep.recalibrate(), None);
+        let before = sweep.calibrate().expect("one thread");
+        assert!(before.gouraud_ms > 0.0 && before.phong_ms > 0.0);
+        assert_eq!(before.frames, 3);
+        // Two frames are measured while the sweep runs.
+        let budgets = [1.0, 2.0].map(SweepBudget::from_millis);
+        let mut gouraud_rmse = 0.0;
+        sweep.run(&budgets, |row| {
+            if row.method == "gouraud" {
+                gouraud_rmse = row.error.rmse;
+            }
+            ControlFlow::Continue(())
+        });
+        let after = sweep.recalibrate().expect("there was one");
+        assert_eq!(after.frames, 3);
+        // On a clock that moves on by each reading, the same work takes the same time.
+        assert!(Noise::between(&before, &after).drift < 1e-9);
+        assert!(gouraud_rmse > 0.0);
+        assert_eq!(before.gouraud_rmse, gouraud_rmse);
+    }
 
-        let calibration = Calibration {
-            gouraud_ms: 2.0,
-            phong_ms: 10.0,
+    #[test]
+    fn images_come_with_their_rows() {
+        let scene = scene();
+        let options = SweepOptions {
+            repeats: 3,
+            ..options()
         };
-        assert_eq!(calibration.budget(0.0).millis, 2.0);
-        assert_eq!(calibration.budget(0.25).millis, 4.0);
-        assert_eq!(calibration.budget(1.0).millis, 10.0);
-        let upside_down = Calibration {
-            gouraud_ms: 3.0,
-            phong_ms: 2.0,
-        };
-        assert_eq!(upside_down.budget(0.5).millis, 3.0);
+        let mut sweep = Sweep::new("teapot", &scene, options).expect("one thread");
+        let mut images = Vec::new();
+        sweep.run_with_images(SweepBudget::from_millis(1.0), |row, frame| {
+            images.push((row, frame));
+        });
+        assert_eq!(images.len(), 2);
+        for (row, frame) in &images {
+            let error = ErrorReport::compare(frame, sweep.reference()).expect("same size");
+            assert_eq!(error, row.error, "{}", row.method);
+        }
     }
 
     #[test]
@@ -492,30 +457,5 @@ mod tests {
         assert_eq!(index(&[]), 0);
         assert_eq!(index(&[5.0, 1.0, 3.0]), 2);
         assert_eq!(index(&[4.0, 1.0, 3.0, 2.0]), 3);
-    }
-
-    #[test]
-    fn csv_has_a_field_for_each_column() {
-        let row = SweepRow {
-            scene: "a, \"b\"".to_owned(),
-            method: "phong",
-            budget_ms: 2.0,
-            fraction: None,
-            frame: 1,
-            frame_ms: 2.5,
-            overshoot_ms: 0.5,
-            error: crate::measure::ErrorHistogram::default().report(),
-            triangles_subdivided: 7,
-            converged: true,
-        };
-        let line = row.to_csv();
-        assert!(line.starts_with("\"a, \"\"b\"\"\",phong,2.0000,,1,2.5000,0.5000,0.0000,,0,0,"));
-        // One comma of the line is inside of the quotes.
-        let columns = SweepRow::CSV_HEADER.split(',').count();
-        assert_eq!(line.split(',').count(), columns + 1);
-        let json = serde_json::to_value(&row).expect("plain numbers");
-        for key in SweepRow::CSV_HEADER.split(',') {
-            assert!(json.get(key).is_some(), "no {key} in {json}");
-        }
     }
 }
