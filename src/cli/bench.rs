@@ -42,7 +42,7 @@ pub(super) struct Bench {
     #[arg(long, value_name = "N", default_value = "60", value_parser = limited_count)]
     views: u32,
 
-    /// How to shade: flat, gouraud, phong, adaptive, phong-area or phong-tiles
+    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles or phong-half
     #[arg(long, default_value_t)]
     method: Method,
 

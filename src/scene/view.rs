@@ -19,7 +19,7 @@ use crate::output::Encoding;
 use glam::{DMat4, DVec3, DVec4};
 
 /// Where the viewer is, in world space.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Eye {
     /// At a point (perspective).
     Point([f32; 3]),
