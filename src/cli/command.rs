@@ -5,6 +5,7 @@ use super::animate::{self, Animate};
 use super::bench::{self, Bench};
 use super::inspect::{self, Inspect};
 use super::render::{self, Render};
+use super::soak::{self, Soak};
 use super::sweep::{self, Sweep};
 use clap::{Parser, Subcommand};
 
@@ -18,6 +19,7 @@ Examples:
   specula animate scenes/turntable.ron -o turntable.apng --budget 4
   specula sweep scenes/teapot.ron --methods all --csv teapot.csv
   specula bench scenes/teapot.ron --budget 4
+  specula soak --frames 3000 --csv soak.csv
   specula inspect scenes/teapot.ron --budget 2 --overlay overlay.png
 
 Exit status: 0 done, 1 failed (also: a file cannot be read or written), 2 bad usage or bad input.")]
@@ -37,6 +39,8 @@ enum Command {
     Sweep(Sweep),
     /// Measure frame times over views from all around a scene
     Bench(Bench),
+    /// Count late frames: many budgets before a moving camera, beside an engine that only waits
+    Soak(Soak),
     /// Say what a view consists of, and draw it over the image
     Inspect(Inspect),
 }
@@ -49,6 +53,7 @@ impl Arguments {
             Command::Animate(args) => animate::run(args),
             Command::Sweep(args) => sweep::run(args),
             Command::Bench(args) => bench::run(args),
+            Command::Soak(args) => soak::run(args),
             Command::Inspect(args) => inspect::run(args),
         }
     }

@@ -12,6 +12,7 @@ mod inspect;
 mod machine;
 mod render;
 mod report;
+mod soak;
 mod sweep;
 
 use clap::Parser;
