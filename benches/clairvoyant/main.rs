@@ -17,8 +17,10 @@
 //! What is compared is the **area** under RMSE (8-bit codes, over covered pixels) by work, from no work to `W`, the nominal cost of
 //! shading every covered pixel, divided by `W`; so it is a mean RMSE.
 
+mod curve;
 mod states;
 
+use curve::{Point, area, share_at};
 use specula::geometry::screen::{TrianglePlanes, normalized_weights};
 use specula::math::PixelPoint;
 use specula::measure::{ErrorReport, ReferenceImage};
@@ -37,58 +39,82 @@ const BUDGET_STEP: f64 = 1.2;
 /// What is reached at which share of `W`.
 const PSNR_DB: [f64; 4] = [35.0, 40.0, 45.0, 50.0];
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+type Failure = Box<dyn std::error::Error>;
+
+fn main() -> Result<(), Failure> {
     let arguments = Arguments::parse(std::env::args().skip(1))?;
     let mut csv = "scene,curve,work_units,share,rmse\n".to_owned();
+    let decibels = PSNR_DB.map(|db| format!("{db}")).join(", ");
     println!(
-        "{:<10} {:>7} {:>10} {:>8} | area: {:>8} {:>8} {:>6} | share of W at {} dB (clairvoyant / engine)",
-        "scene", "visible", "W", "gouraud", "clairv.", "engine", "ratio", "35, 40, 45, 50"
+        "{:<10} {:>7} {:>10} {:>8} | area: {:>8} {:>8} {:>6} | share of W at {decibels} dB (clairvoyant / engine)",
+        "scene", "visible", "W", "gouraud", "clairv.", "engine", "ratio"
     );
     for name in &arguments.scenes {
         let path = format!("{}/scenes/{name}.ron", env!("CARGO_MANIFEST_DIR"));
-        let scene = Scene::load(Path::new(&path))?;
-        let subject = Subject::new(&scene, arguments.size)?;
-        let all_phong = subject.phong_cost();
-        let curves = [
-            ("clairvoyant", subject.clairvoyant()),
-            ("engine", subject.engine(&scene)?),
-        ];
-        for (curve, points) in &curves {
-            for point in points {
-                writeln!(
-                    csv,
-                    "{name},{curve},{:.0},{:.6},{:.5}",
-                    point.units,
-                    point.units / all_phong,
-                    point.rmse
-                )?;
-            }
-        }
-        let [best, ours] = curves.map(|(_, points)| points);
-        let (start, our_start) = (best[0].rmse, ours[0].rmse);
-        if (start - our_start).abs() > 0.02 * our_start {
-            return Err(format!(
-                "{name}: the engine's first image has an RMSE of {our_start}, not {start}"
-            )
-            .into());
-        }
-        let (best_area, our_area) = (area(&best, all_phong), area(&ours, all_phong));
-        let shares = PSNR_DB.map(|db| {
-            let share = |points| share_at(points, db, all_phong);
-            format!("{} / {}", share(&best), share(&ours))
-        });
-        println!(
-            "{name:<10} {:>7} {all_phong:>10.0} {:>8.3} |       {best_area:>8.4} {our_area:>8.4} {:>6.3} | {}",
-            subject.owned.len(),
-            start,
-            our_area / best_area,
-            shares.join(",  ")
-        );
+        let comparison = Comparison::new(&Scene::load(Path::new(&path))?, arguments.size)?;
+        println!("{name:<10} {}", comparison.row());
+        comparison.write_csv(name, &mut csv)?;
     }
     if let Some(path) = &arguments.csv {
         std::fs::write(path, csv)?;
     }
     Ok(())
+}
+
+/// Both curves of a view.
+struct Comparison {
+    visible: usize,
+    /// Nominal cost of shading all covered pixels.
+    all_phong: f64,
+    clairvoyant: Vec<Point>,
+    engine: Vec<Point>,
+}
+
+impl Comparison {
+    fn new(scene: &Scene, size: (u32, u32)) -> Result<Self, Failure> {
+        let subject = Subject::new(scene, size)?;
+        let comparison = Self {
+            visible: subject.owned.len(),
+            all_phong: subject.phong_cost(),
+            clairvoyant: subject.clairvoyant(),
+            engine: subject.engine(scene)?,
+        };
+        let [expected, found] =
+            [&comparison.clairvoyant, &comparison.engine].map(|points| points[0].rmse);
+        if (expected - found).abs() > 0.02 * expected {
+            let message = format!("the first image has an RMSE of {found}, not {expected}");
+            return Err(message.into());
+        }
+        Ok(comparison)
+    }
+
+    /// A line of the table.
+    fn row(&self) -> String {
+        let [best, ours] = [&self.clairvoyant, &self.engine];
+        let [best_area, our_area] = [best, ours].map(|points| area(points, self.all_phong));
+        let shares = PSNR_DB.map(|db| {
+            let [best, ours] = [best, ours].map(|points| share_at(points, db, self.all_phong));
+            format!("{best} / {ours}")
+        });
+        format!(
+            "{:>7} {:>10.0} {:>8.3} |       {best_area:>8.4} {our_area:>8.4} {:>6.3} | {}",
+            self.visible,
+            self.all_phong,
+            best[0].rmse,
+            our_area / best_area,
+            shares.join(",  ")
+        )
+    }
+
+    fn write_csv(&self, name: &str, csv: &mut String) -> std::fmt::Result {
+        for (curve, points) in [("clairvoyant", &self.clairvoyant), ("engine", &self.engine)] {
+            for Point { units, rmse } in points {
+                let share = units / self.all_phong;
+                writeln!(csv, "{name},{curve},{units:.0},{share:.6},{rmse:.5}")?;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What was asked for.
@@ -132,40 +158,6 @@ impl Arguments {
         }
         Ok(arguments)
     }
-}
-
-/// A point of a curve.
-#[derive(Clone, Copy)]
-struct Point {
-    units: f64,
-    rmse: f64,
-}
-
-/// The mean of a curve's RMSE over work from 0 to `end`, straight between its points, the last of which goes on.
-fn area(points: &[Point], end: f64) -> f64 {
-    let mut sum = 0.0;
-    for pair in points.windows(2).filter(|pair| pair[0].units < end) {
-        let [a, b] = [pair[0], pair[1]];
-        let to = b.units.min(end);
-        let length = to - a.units;
-        let at_end = a.rmse + (b.rmse - a.rmse) * length / (b.units - a.units).max(1e-9);
-        sum += length * (a.rmse + at_end) / 2.0;
-    }
-    if let Some(last) = points.last() {
-        sum += (end - last.units).max(0.0) * last.rmse;
-    }
-    sum / end
-}
-
-/// The share of `all_phong` at which a curve reaches so many decibels.
-fn share_at(points: &[Point], db: f64, all_phong: f64) -> String {
-    let enough = 255.0 / 10_f64.powf(db / 20.0);
-    points
-        .iter()
-        .find(|point| point.rmse <= enough)
-        .map_or("-".to_owned(), |point| {
-            format!("{:.3}", point.units / all_phong)
-        })
 }
 
 /// A view, its reference, and who owns which pixels.
@@ -297,7 +289,7 @@ impl Subject {
     }
 
     /// RMSE by work of the engine, each point from cold.
-    fn engine(&self, scene: &Scene) -> Result<Vec<Point>, Box<dyn std::error::Error>> {
+    fn engine(&self, scene: &Scene) -> Result<Vec<Point>, Failure> {
         let options = EngineOptions {
             threads: Some(1),
             ..EngineOptions::default()

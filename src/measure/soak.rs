@@ -12,7 +12,7 @@
 //! time of a first image.
 //!
 //! **Work done**: a deadline is easily kept by giving up early. For one in so many frames a second engine finds out how many
-//! work units a frame of the same view completes in the same time if no clock stops it, see [`work`].
+//! work units a frame of the same view completes in the same time if no clock stops it.
 
 mod null;
 mod plan;
