@@ -8,6 +8,7 @@ mod args;
 mod bench;
 mod command;
 mod console;
+mod csv;
 mod inspect;
 mod machine;
 mod render;

@@ -3,9 +3,9 @@
 use super::Failure;
 use super::args::{Machine, count, name_of};
 use super::console::{Output, Progress};
+use super::csv::Csv;
 use super::machine::cpu_model;
 use super::report::list;
-use super::sweep::Csv;
 use clap::Args;
 use serde_json::json;
 use specula::measure::soak::{LateFrames, OvershootMs, SoakCalibration};

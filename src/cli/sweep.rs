@@ -325,13 +325,13 @@ impl Report {
 
 /// A file of comma-separated values that is complete up to the last row measured, whatever happens next.
 #[derive(Debug)]
-pub(super) struct Csv {
+struct Csv {
     path: PathBuf,
     file: File,
 }
 
 impl Csv {
-    pub(super) fn create(path: &Path) -> Result<Self, Failure> {
+    fn create(path: &Path) -> Result<Self, Failure> {
         match File::create(path) {
             Ok(file) => Ok(Self {
                 path: path.to_owned(),
@@ -341,7 +341,7 @@ impl Csv {
         }
     }
 
-    pub(super) fn line(&mut self, text: &str) -> Result<(), Failure> {
+    fn line(&mut self, text: &str) -> Result<(), Failure> {
         // One unbuffered write for each line: nothing to flush.
         self.file
             .write_all(format!("{text}\n").as_bytes())

@@ -2,6 +2,7 @@
 //! against time, soaks that count late frames, and looking into an image.
 
 pub mod bench;
+mod csv;
 pub mod inspection;
 pub mod metrics;
 pub mod overlay;

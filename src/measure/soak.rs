@@ -132,7 +132,7 @@ impl SoakRow {
         let stages = self.stage_ms.entries().map(|(_, ms)| format!("{ms:.4}"));
         format!(
             "{},{},{:.4},{},{},{},{:.4},{:.4},{:.4},{},{},{},{},{}",
-            super::sweep::quoted(&self.scene),
+            super::csv::quoted(&self.scene),
             self.frame,
             self.budget_ms,
             self.fraction.map_or_else(String::new, |f| f.to_string()),

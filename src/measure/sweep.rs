@@ -191,7 +191,7 @@ impl SweepRow {
 }
 
 /// A field of comma-separated values, in quotes if it needs them.
-pub(super) fn quoted(text: &str) -> String {
+fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
