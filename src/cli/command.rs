@@ -6,6 +6,7 @@ use super::bench::{self, Bench};
 use super::compare::{self, Compare};
 use super::inspect::{self, Inspect};
 use super::render::{self, Render};
+use super::soak::{self, Soak};
 use super::sweep::{self, Sweep};
 use clap::{Parser, Subcommand};
 
@@ -20,6 +21,7 @@ Examples:
   specula sweep scenes/teapot.ron --methods all --repeat 9 --svg teapot.svg
   specula compare scenes/closeup.ron -o sheet.png
   specula bench scenes/teapot.ron --budget 4
+  specula soak --frames 3000 --csv soak.csv
   specula inspect scenes/teapot.ron --budget 2 --overlay overlay.png
 
 Exit status: 0 done, 1 failed (also: a file cannot be read or written), 2 bad usage or bad input.")]
@@ -41,6 +43,8 @@ enum Command {
     Compare(Compare),
     /// Measure frame times over views from all around a scene
     Bench(Bench),
+    /// Count late frames: many budgets before a moving camera, beside an engine that only waits
+    Soak(Soak),
     /// Say what a view consists of, and draw it over the image
     Inspect(Inspect),
 }
@@ -54,6 +58,7 @@ impl Arguments {
             Command::Sweep(args) => sweep::run(args),
             Command::Compare(args) => compare::run(args),
             Command::Bench(args) => bench::run(args),
+            Command::Soak(args) => soak::run(args),
             Command::Inspect(args) => inspect::run(args),
         }
     }

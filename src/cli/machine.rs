@@ -54,7 +54,7 @@ impl Facts {
 }
 
 /// The processor's name where the system tells it.
-fn cpu_model() -> String {
+pub(super) fn cpu_model() -> String {
     std::fs::read_to_string("/proc/cpuinfo")
         .ok()
         .and_then(|text| model_name(&text))

@@ -9,11 +9,13 @@ mod bench;
 mod command;
 mod compare;
 mod console;
+mod csv;
 mod inspect;
 mod log;
 mod machine;
 mod render;
 mod report;
+mod soak;
 mod sweep;
 
 use clap::Parser;

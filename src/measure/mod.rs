@@ -1,13 +1,15 @@
 //! Measuring images: the Phong reference, error metrics, frame times around a scene, sweeps of error
-//! against time, and looking into an image.
+//! against time, soaks that count late frames, and looking into an image.
 
 pub mod bench;
+mod csv;
 pub mod error_map;
 pub mod flicker;
 pub mod inspection;
 pub mod metrics;
 pub mod overlay;
 pub mod reference;
+pub mod soak;
 pub mod sweep;
 
 pub use bench::{BenchOptions, BenchPhase, BenchReport, bench};
@@ -17,6 +19,7 @@ pub use inspection::Inspection;
 pub use metrics::{ErrorHistogram, ErrorReport, Mismatch};
 pub use overlay::{Layer, draw_overlay};
 pub use reference::ReferenceImage;
+pub use soak::{Soak, SoakOptions, SoakRow, SoakSummary};
 pub use sweep::{
     Calibration, Curve, CurveArea, CurvePoint, Noise, Sweep, SweepBudget, SweepOptions, SweepRow,
 };

@@ -29,7 +29,7 @@ pub const PIXELS_PER_SAMPLE: u32 = 256;
 pub const EDGE_SHARE: f32 = 16.0 / 135.0;
 
 /// Most samples inside one leaf.
-pub const MAX_SAMPLES: usize = 64;
+pub const MAX_SAMPLES: usize = 8;
 
 /// Samples that are evaluated together, as a rule at most: what fits into a piece of work.
 pub const SAMPLES_AT_ONCE: usize = 2048;

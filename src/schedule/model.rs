@@ -29,6 +29,9 @@ const MOST_SURPRISE: f64 = 2.0;
 /// Weight of a measurement in the typical deviation.
 const SPREAD_STEP: f64 = 0.1;
 
+/// Measurements of less nominal work say more about what it takes to begin with any.
+const LEAST_NS: f64 = 10_000.0;
+
 /// What is left of a rate that was doubted.
 const DOUBT: f64 = 0.8;
 
@@ -156,11 +159,12 @@ impl Rate {
         self.predict_ms(load) * (1.0 + CAUTION * self.spread)
     }
 
-    /// Takes note that the work took `ms` milliseconds. What is no positive number is ignored.
+    /// Takes note that the work took `ms` milliseconds. What is no positive number is ignored, and so is too little work.
     pub fn learn(&mut self, load: Load, ms: f64) {
         let predicted = self.predict_ms(load);
         let is_measurement = |value: f64| value > 0.0 && value.is_finite();
-        if !is_measurement(ms) || !is_measurement(predicted) {
+        let is_enough = load.items_ns + load.pixels_ns >= LEAST_NS;
+        if !(is_enough && is_measurement(ms) && is_measurement(predicted)) {
             return;
         }
         let ratio = ms / predicted;

@@ -269,7 +269,10 @@ impl Refinement {
         allowance: &mut Allowance<'_>,
     ) -> bool {
         let limit = piece_limit(stage, allowance).min(allowance.units_left().max(PIECE_UNITS));
-        if !allowance.admit_free(limit) {
+        let lights = stage.world.lights.len();
+        let each = cost::collecting(1.0, lights) + cost::samples(1, lights);
+        let left = (self.visible - self.roots.len()) as f32 * each;
+        if !allowance.admit_free(limit.min(left as u64)) {
             return false;
         }
         let first = self.roots.len();

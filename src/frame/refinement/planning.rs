@@ -2,15 +2,17 @@
 
 use super::parts;
 use super::ranking::{self, Action};
-use super::{
-    Candidate, Owner, PIECE_UNITS, Progress, Refinement, Root, RootShading, Shading, Stage,
-};
+use super::{Candidate, Owner, Progress, Refinement, Root, RootShading, Shading, Stage};
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
 use crate::highlight;
 use crate::illumination::{self, ActiveLights, ShadingKit};
 use crate::refine::{LeafId, LeafState, PlanOutcome, SplitOutcome};
 use crate::schedule::{Allowance, cost};
+
+/// Nominal nanoseconds of a planning piece, the painting it asks for included: patches are painted in list order, so
+/// what is planned first keeps everything found later waiting.
+const PLANNING_UNITS: u64 = 20_000;
 
 impl Refinement {
     /// Takes up the best candidates. False when there are none, or the budget does not admit the next one.
@@ -20,7 +22,8 @@ impl Refinement {
         allowance: &mut Allowance<'_>,
     ) -> bool {
         let mut units = 0;
-        while units < PIECE_UNITS {
+        let mut to_paint = 0.0;
+        while units + to_paint as u64 <= PLANNING_UNITS {
             let Some(candidate) = self.next_candidate() else {
                 break;
             };
@@ -40,6 +43,7 @@ impl Refinement {
                 self.deferred.push(candidate);
                 break;
             }
+            to_paint += self.painting_cost(stage, candidate, action);
             self.plan(stage, candidate, action);
             units += more + std::mem::take(&mut self.units_for_bounds);
         }
@@ -99,6 +103,24 @@ impl Refinement {
             }
         };
         units as u64
+    }
+
+    /// About what painting will cost that a candidate asks for.
+    fn painting_cost(&self, stage: &Stage<'_>, candidate: Candidate, action: Action) -> f32 {
+        let (pixels, is_root) = match candidate {
+            Candidate::Root(index) => (self.roots[index as usize].pixels as f32, true),
+            Candidate::Leaf(leaf) => (self.forest.leaf(leaf).pixels as f32, false),
+            Candidate::Part(part) => (self.parts[part as usize].pixels, false),
+        };
+        match action {
+            Action::Split(_) if is_root => 0.0,
+            Action::Split(marks) => {
+                let edges = marks.count_ones() as f32;
+                cost::repaint(edges + 1.0, pixels * (1.0 + 0.5 * edges))
+            }
+            Action::Shade if !is_root && parts::is_large(pixels) => 0.0,
+            Action::Shade => cost::phong(pixels, stage.world.lights.len()),
+        }
     }
 
     /// What bounding the lights on the candidate's root will cost, should it come to that.

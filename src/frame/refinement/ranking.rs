@@ -23,6 +23,13 @@ pub(super) const ERROR_FLOOR: f32 = 1e-3;
 /// edge midpoints deviates by `4/3 m` there, and its mean square is `16/15 m^2`.
 pub(super) const CENTROID_SHARE: f32 = 0.6;
 
+/// Share of the benefit of a split, as expected, that splits bring as a rule: surplus falls by less than a smooth function's
+/// where there is a highlight.
+const SPLIT_YIELD: f32 = 0.5;
+
+/// A triangle that is to be planted comes so much sooner: planting costs little beside what it tells.
+const CURIOSITY: f32 = 4.0;
+
 /// Points that a new leaf has to itself: three edge midpoints, most of them shared by two leaves.
 const POINTS_PER_LEAF: f32 = 1.5;
 
@@ -51,7 +58,7 @@ pub(super) fn lightness(encoding: Encoding, [r, g, b]: [f32; 3]) -> f32 {
 /// replaced by an estimate when the triangle's turn comes.
 pub(super) fn prior_error([a, b, c]: [f32; 3], is_pht: bool) -> f32 {
     let contrast = a.max(b).max(c) - a.min(b).min(c);
-    let highlight = if is_pht { 4.0 } else { 0.0 };
+    let highlight = if is_pht { 64.0 } else { 0.0 };
     contrast * contrast / 1024.0 + highlight + ERROR_FLOOR
 }
 
@@ -92,9 +99,10 @@ impl RootRanking<'_> {
             benefit / cost::phong(pixels, self.lights)
         };
         let planting = self.planting_cost(root.pixels);
-        let split = benefit * (15.0 / 16.0) / (planting + split_cost(pixels, 3, self.lights));
+        let splitting = planting + split_cost(pixels, 3, self.lights);
+        let split = SPLIT_YIELD * benefit * (15.0 / 16.0) / splitting;
         if split > shade {
-            (split, Action::Split(7))
+            (CURIOSITY * split, Action::Split(7))
         } else {
             (shade, Action::Shade)
         }
@@ -166,7 +174,7 @@ impl Refinement {
                 splitting += split_cost(other.pixels as f32, 1, lights);
             }
         }
-        let split = benefit / splitting;
+        let split = SPLIT_YIELD * benefit / splitting;
         if split >= shade {
             (split, Action::Split(marks))
         } else {

@@ -1,6 +1,7 @@
 //! What a sweep measures of a frame, and how files of comma-separated values tell it.
 
 use crate::measure::ErrorReport;
+use crate::measure::csv;
 use serde::Serialize;
 
 /// What was measured of one frame.
@@ -46,7 +47,7 @@ impl SweepRow {
         };
         let error = &self.error;
         [
-            quoted(&self.scene),
+            csv::quoted(&self.scene),
             self.method.to_owned(),
             number(self.budget_ms),
             self.fraction.map_or_else(String::new, number),
@@ -65,15 +66,6 @@ impl SweepRow {
             error.excluded_pixels.to_string(),
         ]
         .join(",")
-    }
-}
-
-/// A field of comma-separated values, in quotes if it needs them.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
     }
 }
 
