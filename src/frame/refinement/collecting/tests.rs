@@ -135,7 +135,7 @@ fn expected(exec: Exec, image: &Image, method: Method) -> Vec<Expected> {
         let contrast =
             codes.into_iter().fold(0.0, f32::max) - codes.into_iter().fold(255.0, f32::min);
         let mut prior =
-            contrast * contrast / 1024.0 + if is_pht { 4.0 } else { 0.0 } + ranking::ERROR_FLOOR;
+            contrast * contrast / 1024.0 + if is_pht { 64.0 } else { 0.0 } + ranking::ERROR_FLOOR;
         if pixels >= PIXELS_FOR_CENTROID && method == Method::Adaptive {
             let mean = |of: &Vec3s| {
                 let [a, b, c] = corners.map(|v| of.get(v as usize));
@@ -160,7 +160,9 @@ fn expected(exec: Exec, image: &Image, method: Method) -> Vec<Expected> {
                 let planting = cost::leaves(1.0, 1.5, lights) + samples;
                 let split = planting + cost::leaves(4.0, 1.5, lights) + cost::repaint(4.0, area);
                 let benefit = area * prior;
-                (benefit / cost::phong(area, lights)).max(benefit * (15.0 / 16.0) / split)
+                let shade = benefit / cost::phong(area, lights);
+                let split = 0.5 * benefit * (15.0 / 16.0) / split;
+                if split > shade { 4.0 * split } else { shade }
             }
         };
         (triangle, pixels, prior, is_pht, Rank::new(rank))
