@@ -1,8 +1,17 @@
 //! The engine: the one place that knows all stages.
 //!
-//! `renderer.rs` holds the frame loop. Read it first; it says what happens in a frame and in which order. `engine.rs` is what its users
-//! see. `base.rs` draws
-//! the first image, `refinement/` makes it better; `refine_first.rs` is how, where the backend cannot repaint.
+//! `renderer.rs` holds the frame loop. Read it first; it says what happens in a frame and in which order.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `engine.rs` | the engine as its users see it; `options.rs`, `method.rs`, `stats.rs` what goes in and comes out |
+//! | `renderer.rs` | the frame loop |
+//! | `shelf.rs` | the pictures: one at full resolution, one at a lower one |
+//! | `picture.rs` | an image in the making, stage by stage, each of which may be interrupted |
+//! | `base.rs` | what the stages of a first image do |
+//! | `refinement/` | makes it better; `refine_first.rs` is how, where the backend cannot repaint, `tiles.rs` is a simple rival |
+//! | `handover.rs` | brings the caller's frame up to date |
+//! | `load.rs`, `calibration.rs` | how much work a first image is, and what work takes on this machine |
 
 mod base;
 mod calibration;

@@ -137,6 +137,7 @@ impl Renderer {
             if !(work.allowance.begins_image()
                 && self.draw_image(&image, Some(target), is_first, work))
             {
+                self.ladder.note_missed();
                 return;
             }
             is_first = false;

@@ -3,7 +3,8 @@
 //! An image of divisor `d` has a `d`-th of the width and of the height. The rungs of the ladder are the [`DIVISORS`].
 //!
 //! * The **step down** is taken at once: as soon as the image at the present divisor is predicted not to fit, the smallest divisor is taken
-//!   that fits with [`ROOM`] to spare.
+//!   that fits with [`ROOM`] to spare. After an image that was not there in time, against the prediction, the present one has to fit with room
+//!   to spare, too.
 //! * The **step up** is taken when a smaller divisor has been predicted to fit, with room to spare, for some images in a row. If
 //!   it has to be taken back soon after, the next one is waited for twice as long. So noise in predictions does not
 //!   make the resolution flicker. One that is predicted to take at most [`DOUBTLESS`] of the budget is not waited for: a larger budget
@@ -46,6 +47,8 @@ pub struct Ladder {
     patience: u32,
     /// Images since the last step up.
     since_up: u32,
+    /// The last image was not there in time.
+    has_missed: bool,
 }
 
 impl Default for Ladder {
@@ -55,6 +58,7 @@ impl Default for Ladder {
             fitting: 0,
             patience: LEAST_PATIENCE,
             since_up: u32::MAX,
+            has_missed: false,
         }
     }
 }
@@ -72,7 +76,12 @@ impl Ladder {
             .find(|&rung| fits(rung, ROOM))
             .or_else(|| rungs().find(|&rung| ends(rung)))
             .unwrap_or(last);
-        let is_enough = fits(self.rung, 1.0) || wanted <= self.rung && ends(self.rung);
+        let share = if std::mem::take(&mut self.has_missed) {
+            ROOM
+        } else {
+            1.0
+        };
+        let is_enough = fits(self.rung, share) || wanted <= self.rung && ends(self.rung);
         if !is_enough && wanted > self.rung {
             self.step_down(wanted);
         } else if let Some(rung) = (0..self.rung).find(|&rung| fits(rung, DOUBTLESS)) {
@@ -84,6 +93,11 @@ impl Ladder {
             self.fitting = 0;
         }
         DIVISORS[self.rung]
+    }
+
+    /// Takes note that the last image was not there in time.
+    pub fn note_missed(&mut self) {
+        self.has_missed = true;
     }
 
     fn step_down(&mut self, rung: usize) {
@@ -157,6 +171,21 @@ mod tests {
         // Or at once, when there is plenty.
         assert_eq!(ladder.choose(6.0, frame(1.0, 12.0)), 2);
         assert_eq!(ladder.choose(33.0, frame(1.0, 12.0)), 1);
+    }
+
+    #[test]
+    fn after_a_miss_there_has_to_be_room() {
+        let mut ladder = Ladder::default();
+        // 5.5 ms.
+        assert_eq!(ladder.choose(6.0, frame(1.0, 4.0)), 1);
+        ladder.note_missed();
+        assert_eq!(ladder.choose(6.0, frame(1.0, 4.0)), 2);
+        // Where triangles take the time, the next image will not be there in time either.
+        let mut ladder = Ladder::default();
+        for _ in 0..10 {
+            assert_eq!(ladder.choose(4.0, frame(20.0, 3.0)), 1);
+            ladder.note_missed();
+        }
     }
 
     #[test]
