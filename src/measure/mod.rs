@@ -7,6 +7,7 @@ pub mod flicker;
 pub mod inspection;
 pub mod metrics;
 pub mod overlay;
+pub mod predictions;
 pub mod reference;
 pub mod sweep;
 
@@ -16,6 +17,7 @@ pub use flicker::flicker;
 pub use inspection::Inspection;
 pub use metrics::{ErrorHistogram, ErrorReport, Mismatch};
 pub use overlay::{Layer, draw_overlay};
+pub use predictions::PredictionErrors;
 pub use reference::ReferenceImage;
 pub use sweep::{
     Calibration, Curve, CurveArea, CurvePoint, Noise, Sweep, SweepBudget, SweepOptions, SweepRow,
