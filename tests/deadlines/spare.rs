@@ -116,8 +116,14 @@ fn a_cancelled_engine_returns_soon_keeps_its_image_and_goes_on_later() {
         (Method::Phong, 1),
     ] {
         let want = converged(&scene, method);
-        let mut stopped = 0;
-        for at in 1..60 {
+        let (mut stopped, mut refining) = (0, 0);
+        // Readings of a frame that nobody stops.
+        let clock = CountingClock::stepping(1.0);
+        let mut undisturbed = engine(&scene, options(method, threads, clock.clone()));
+        let mut frame = Frame::new(SIZE[0], SIZE[1]);
+        undisturbed.render(&scene, Budget::Millis(1e6), &mut frame);
+        let readings = clock.readings();
+        for at in (1..readings).step_by((readings / 80).max(1) as usize) {
             let token = CancelToken::new();
             let clock = CountingClock::cancelling(1.0, at, token.clone());
             let mut engine = engine(
@@ -132,6 +138,7 @@ fn a_cancelled_engine_returns_soon_keeps_its_image_and_goes_on_later() {
             let what = format!("{method}, {threads} threads, reading {at}: {stats:?}");
             if token.is_cancelled() && !stats.converged {
                 stopped += 1;
+                refining += u64::from(stats.record.images > 0);
                 let beyond = clock.readings() - (at + 1);
                 assert!(
                     beyond <= MOST_READINGS + threads as u64,
@@ -152,6 +159,10 @@ fn a_cancelled_engine_returns_soon_keeps_its_image_and_goes_on_later() {
             finish(&mut engine, &scene, Budget::Millis(1e6), &mut frame);
             assert!(frame.pixels() == want, "{what}");
         }
-        assert!(stopped > 5, "{method}: {stopped} frames were stopped");
+        let least = if method == Method::Adaptive { 3 } else { 0 };
+        assert!(
+            stopped > 5 && refining >= least,
+            "{method}: {stopped} frames were stopped, {refining} of them while refining"
+        );
     }
 }
