@@ -156,7 +156,7 @@ fn a_cut_and_changes_of_the_scene_in_the_middle_of_an_image_do_no_harm() {
         4 => scene.set_background([0.9, 0.1, 0.1]),
         5 => scene.set_objects(scene.objects()[..2].to_vec()),
         _ => {
-            let mut material = scene.materials()[0].clone();
+            let mut material = scene.materials()[0];
             material.shininess = 5.0;
             scene.set_material(0, material);
         }
