@@ -1,8 +1,13 @@
 //! Images of lower resolution.
 
 use crate::common::*;
+use specula::backend::software::SoftwareBackend;
+use specula::backend::{Backend, BasePaint, Capabilities, Geometry, RasterCounts};
 use specula::frame::Outcome;
+use specula::geometry::Vec3s;
+use specula::illumination::VertexSet;
 use specula::output::{ChannelOrder, Target};
+use specula::parallel::Exec;
 use specula::{Budget, Engine, Frame, Method, Scene};
 
 /// The first image of a new engine at `divisor`, drawn as an image of its own and enlarged by the definition.
@@ -35,11 +40,6 @@ fn enlarged(scene: &Scene, [width, height]: [u32; 2], divisor: u32) -> Vec<[f64;
 
 /// Draws a view with Gouraud shading, without an engine.
 fn first_image(world: &specula::scene::World, view: &specula::scene::View) -> Pixels {
-    use specula::backend::software::SoftwareBackend;
-    use specula::backend::{Backend, BasePaint, Geometry};
-    use specula::geometry::Vec3s;
-    use specula::illumination::VertexSet;
-    use specula::parallel::Exec;
     let exec = Exec::sequential();
     let all = 0..world.triangles.len() as u32;
     let geometry = Geometry {
@@ -141,6 +141,65 @@ fn divisors_that_there_are_not_count_as_the_nearest_there_is() {
             frame.pixels() == fresh(&scene, Method::Gouraud, SIZE, near),
             "{odd}"
         );
+    }
+}
+
+/// A backend of which there can be only one draws all resolutions, one after the other.
+#[test]
+fn a_backend_without_a_sibling_changes_its_resolution() {
+    let scene = mixed();
+    for method in [Method::PhongHalf, Method::Gouraud] {
+        let clock = CountingClock::stepping(0.0);
+        let options = options(method, 1, clock);
+        let only = Box::new(Only(SoftwareBackend::new()));
+        let mut engine = Engine::with_backend(&scene, options, only).expect("it can do it");
+        let mut frame = Frame::new(SIZE[0], SIZE[1]);
+        for divisor in [2, 1, 3, 1] {
+            let now = turned(&scene, u64::from(divisor));
+            let stats = engine.render(&now, first_image_at(divisor), &mut frame);
+            assert!(
+                !matches!(stats.outcome, Outcome::Stale { .. }),
+                "{method}: {stats:?}"
+            );
+            let want = fresh(&now, method, SIZE, stats.divisor);
+            assert!(frame.pixels() == want, "{method}, {divisor}: {stats:?}");
+            let stats = engine.render(&now, Budget::Unlimited, &mut frame);
+            assert!(stats.converged, "{method}, {divisor}: {stats:?}");
+        }
+    }
+}
+
+/// The software backend, but there can be only one.
+#[derive(Debug)]
+struct Only(SoftwareBackend);
+
+impl Backend for Only {
+    fn capabilities(&self) -> Capabilities {
+        self.0.capabilities()
+    }
+
+    fn rasterize(&mut self, exec: Exec, geometry: Geometry<'_>) -> RasterCounts {
+        self.0.rasterize(exec, geometry)
+    }
+
+    fn visible_triangles(&self) -> &[u32] {
+        self.0.visible_triangles()
+    }
+
+    fn visible_pixels(&self, triangle: u32) -> u32 {
+        self.0.visible_pixels(triangle)
+    }
+
+    fn resolve(&mut self, exec: Exec, geometry: Geometry<'_>, paint: BasePaint<'_>) {
+        self.0.resolve(exec, geometry, paint);
+    }
+
+    fn pending_pixels(&self, target: &Target<'_>) -> u64 {
+        self.0.pending_pixels(target)
+    }
+
+    fn present(&mut self, exec: Exec, target: &mut Target<'_>) -> u64 {
+        self.0.present(exec, target)
     }
 }
 

@@ -5,7 +5,7 @@ use specula::clock::SystemClock;
 use specula::frame::Outcome;
 use specula::glam::{DMat4, DVec3};
 use specula::schedule::{CancelToken, CostModel, FrameRecord};
-use specula::{Budget, Engine, EngineOptions, Frame, Method, Scene};
+use specula::{BackendKind, Budget, Engine, EngineOptions, Frame, Method, Scene};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -127,6 +127,33 @@ fn timed_frames_are_repeated_bit_for_bit_by_other_engines() {
             seen.contains(name),
             "{name} is among what is repeated: {seen:?}"
         );
+    }
+}
+
+/// It refines first, and then draws everything once.
+#[test]
+fn timed_frames_of_a_backend_that_cannot_repaint_are_repeated_too() {
+    let scene = mixed();
+    for (us, budget_ms) in [(20.0, 1.0), (100.0, 0.8), (2.0, 6.0)] {
+        let options = |clock: Arc<CountingClock>| EngineOptions {
+            backend: BackendKind::Skia,
+            ..options(Method::Adaptive, 1, clock)
+        };
+        let mut recorded_by = engine(&scene, options(CountingClock::stepping(us)));
+        let recorded = film(&scene, &mut recorded_by, None, |_| {
+            Budget::Millis(budget_ms)
+        });
+        let mut replayed_by = engine(&scene, options(CountingClock::stepping(0.0)));
+        let replayed = film(&scene, &mut replayed_by, None, |number| {
+            Budget::Replay(recorded[number as usize].record)
+        });
+        for (number, (got, want)) in replayed.iter().zip(&recorded).enumerate() {
+            assert!(
+                got == want,
+                "{us} us a reading, frame {number}: {:?}",
+                want.record
+            );
+        }
     }
 }
 

@@ -104,7 +104,10 @@ fn an_image_of_another_view_is_not_final() {
     engine.cancel_token().reset();
     // The camera is the only thing that moved, so spare time knows all that it takes.
     assert!(engine.refine_until(1e9));
-    engine.render(&moved, first_image_at(1), &mut frame);
+    // It was right for the last frame, whenever it was drawn.
+    engine.cancel_token().cancel();
+    let stats = engine.render(&turned(&scene, 6), BUDGET, &mut frame);
+    assert_eq!(stats.outcome, Outcome::Stale { age: Some(1) });
     assert!(frame.pixels() == fresh(&moved, Method::Gouraud, SIZE, 1));
 }
 
