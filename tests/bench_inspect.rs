@@ -122,6 +122,21 @@ fn bench_prints_what_scripts_rely_on() {
             "`{stage}` in {report}"
         );
     }
+    for key in ["prediction_error_median", "prediction_error_p95"] {
+        let errors = report[key].as_object().expect("an object");
+        let names: Vec<&str> = errors.keys().map(String::as_str).collect();
+        let mut stages = vec!["cull", "shade", "classify", "raster", "refine", "resolve"];
+        stages.extend(["present", "total"]);
+        stages.sort_unstable();
+        assert_eq!(names, stages, "{key}");
+        for stage in ["raster", "resolve", "refine", "total"] {
+            let error = errors[stage].as_f64().expect("it was predicted");
+            assert!(error.is_finite() && error >= 0.0, "{stage}: {error}");
+            let [median, p95] = ["prediction_error_median", "prediction_error_p95"]
+                .map(|key| report[key][stage].as_f64());
+            assert!(median <= p95, "{stage}: {report}");
+        }
+    }
     assert_eq!(
         (&report["scene"], &report["method"]),
         (&"teapot".into(), &"adaptive".into())
@@ -146,7 +161,14 @@ fn bench_prints_what_scripts_rely_on() {
 
     let output = run("--work 20000 --error 1");
     let lines = text(&output.stdout);
-    for part in ["frame      min", "1 views compared", "subdivided"] {
+    for part in [
+        "frame      min",
+        "1 views compared",
+        "subdivided",
+        "predicted  off by cull ",
+        " % (medians)",
+        " % (p95)",
+    ] {
         assert!(lines.contains(part), "{lines}");
     }
 }

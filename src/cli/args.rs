@@ -1,16 +1,16 @@
 //! What several commands take on the command line.
 
-use super::Failure;
+use super::{Failure, costs};
 use clap::Args;
 use specula::BackendKind;
-use specula::frame::{Engine, EngineError, EngineOptions, Method};
+use specula::frame::{Engine, EngineOptions, Method};
 use specula::geometry::screen::MAX_IMAGE_SIDE;
 use specula::output::Encoding;
 use specula::output::timing::MAX_DURATION_S;
 use specula::scene::Scene;
-use specula::schedule::Budget;
+use specula::schedule::{Budget, CostModel};
 use specula::simd::SimdLevel;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Most pixels of an image.
@@ -37,6 +37,10 @@ pub(super) struct Machine {
     /// SIMD level to use, such as scalar, sse2, avx2 or neon; the machine's strongest if not given
     #[arg(long, value_name = "LEVEL")]
     pub(super) simd: Option<SimdLevel>,
+
+    /// What work takes on this machine, as `bench --save-costs` wrote it; found out in 20 ms if not given
+    #[arg(long, value_name = "FILE")]
+    costs: Option<PathBuf>,
 }
 
 impl Machine {
@@ -46,20 +50,33 @@ impl Machine {
         scene: &Scene,
         method: Method,
         encoding: Encoding,
-    ) -> Result<Engine, EngineError> {
-        Engine::with_options(scene, self.options(method, encoding))
+    ) -> Result<Engine, Failure> {
+        Ok(Engine::with_options(
+            scene,
+            self.options(method, encoding)?,
+        )?)
     }
 
     /// Options of an engine that uses the machine so.
-    pub(super) fn options(&self, method: Method, encoding: Encoding) -> EngineOptions {
-        EngineOptions {
+    pub(super) fn options(
+        &self,
+        method: Method,
+        encoding: Encoding,
+    ) -> Result<EngineOptions, Failure> {
+        Ok(EngineOptions {
             method,
             backend: self.backend,
             encoding,
             threads: self.threads,
             simd: self.simd,
+            costs: self.costs()?,
             ..EngineOptions::default()
-        }
+        })
+    }
+
+    /// What is known about costs.
+    pub(super) fn costs(&self) -> Result<Option<CostModel>, Failure> {
+        self.costs.as_deref().map(costs::load).transpose()
     }
 
     /// The number of threads that will be used.

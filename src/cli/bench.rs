@@ -1,13 +1,13 @@
 //! `specula bench`: frame times over views from all around a scene.
 
-use super::Failure;
 use super::args::{Machine, budget, count, milliseconds, name_of};
-use super::console::{Output, Progress};
+use super::console::{Output, Progress, note};
 use super::report::list;
+use super::{Failure, costs};
 use clap::Args;
 use specula::frame::Method;
-use specula::measure::{BenchOptions, BenchPhase, BenchReport, bench};
-use specula::output::Encoding;
+use specula::measure::{BenchOptions, BenchPhase, BenchReport, PredictionErrors, bench};
+use specula::output::{Encoding, png};
 use specula::scene::Scene;
 use std::path::PathBuf;
 
@@ -27,13 +27,19 @@ stages and numbers of triangles are means. The error is that of --error views, r
 after all times have been taken; the Phong reference of one takes from a tenth of a second to many,
 depending on its size and the number of lights.
 
+Predictions are what the engine thought that a stage would take, given what it knew before: from them it
+decides what fits into a budget. Their error is |predicted / measured - 1|, 'total' that of their sum.
+
 Examples:
   The paper's experiment:
     specula bench scenes/teapot.ron --size 512x512 --method gouraud
   How often is a frame of 4 ms late, and what is its error?
     specula bench scenes/teapot.ron --budget 4 --repeat 5
   For a script:
-    specula bench scenes/teapot.ron --method phong --error 0 --json | jq .frame_ms_median")]
+    specula bench scenes/teapot.ron --method phong --error 0 --json | jq .frame_ms_median
+  Find out once what work takes on this machine:
+    specula bench scenes/teapot.ron --save-costs costs.ron
+    specula animate scenes/turntable.ron -o turntable.apng --budget 4 --costs costs.ron")]
 pub(super) struct Bench {
     /// Scene file (.ron), or a mesh (.obj), which gets a camera, lights and a material
     scene: PathBuf,
@@ -66,6 +72,10 @@ pub(super) struct Bench {
     #[arg(long, value_name = "N", default_value = "4")]
     error: u32,
 
+    /// Write what the engine has learned about the time that work takes, for --costs
+    #[arg(long, value_name = "FILE")]
+    save_costs: Option<PathBuf>,
+
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -82,6 +92,9 @@ fn limited_count(text: &str) -> Result<u32, String> {
 }
 
 pub(super) fn run(args: &Bench) -> Result<(), Failure> {
+    if let Some(path) = &args.save_costs {
+        png::check_writable(path)?;
+    }
     let scene = Scene::load(&args.scene)?;
     let options = BenchOptions {
         width: args.machine.size.width,
@@ -95,6 +108,7 @@ pub(super) fn run(args: &Bench) -> Result<(), Failure> {
         encoding: args.encoding,
         threads: args.machine.threads,
         simd: args.machine.simd,
+        costs: args.machine.costs()?,
         ..BenchOptions::default()
     };
     let name = name_of(&args.scene);
@@ -120,7 +134,18 @@ pub(super) fn run(args: &Bench) -> Result<(), Failure> {
             .map_err(|error| Failure::runtime(format!("cannot print the report: {error}")))?
     } else {
         text(&report)
-    })
+    })?;
+    if let Some(path) = &args.save_costs {
+        costs::save(path, &report.costs)?;
+        note(&format!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+/// Errors of predictions in percent.
+fn percents(errors: &PredictionErrors) -> String {
+    let known = errors.entries().into_iter();
+    list(known.filter_map(|(name, error)| Some(format!("{name} {:.1}", error? * 100.0))))
 }
 
 /// A block of lines.
@@ -142,6 +167,14 @@ fn text(report: &BenchReport) -> String {
                     .entries()
                     .map(|(name, ms)| format!("{name} {ms:.3}"))
             )
+        ),
+        format!(
+            "  predicted  off by {} % (medians)",
+            percents(&r.prediction_error_median)
+        ),
+        format!(
+            "             off by {} % (p95)",
+            percents(&r.prediction_error_p95)
         ),
         format!(
             "  triangles  {:.1} drawn, {:.1} visible, {:.1} subdivided (means)",

@@ -9,6 +9,7 @@ mod bench;
 mod command;
 mod compare;
 mod console;
+mod costs;
 mod csv;
 mod inspect;
 mod log;

@@ -113,7 +113,7 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
         animate::go_to_time(&mut scene, seconds);
     }
     let [width, height] = run.size;
-    let mut engine = Engine::with_options(&scene, run.options(args))?;
+    let mut engine = Engine::with_options(&scene, run.options(args)?)?;
     let mut frame = Frame::new(width, height);
     if run.is_warmed_up {
         engine.warm_up(&scene, width, height);
@@ -228,11 +228,11 @@ impl Run {
         })
     }
 
-    fn options(&self, args: &Render) -> EngineOptions {
-        EngineOptions {
+    fn options(&self, args: &Render) -> Result<EngineOptions, Failure> {
+        Ok(EngineOptions {
             backend: self.backend,
-            ..args.machine.options(self.method, self.encoding)
-        }
+            ..args.machine.options(self.method, self.encoding)?
+        })
     }
 
     fn count(&self) -> u32 {

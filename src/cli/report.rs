@@ -224,3 +224,43 @@ pub(super) fn noise_warning(noise: &Noise) -> Option<String> {
 pub(super) fn list(items: impl IntoIterator<Item = String>) -> String {
     items.into_iter().collect::<Vec<_>>().join(", ")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use specula::schedule::FrameRecord;
+    use specula::{Engine, Frame, Scene};
+
+    #[test]
+    fn older_and_smaller_images_are_said_to_be_so() {
+        let scene = Scene::parse("(objects: [(shape: Box())])", "box.ron").expect("it is valid");
+        let mut engine = Engine::new(&scene).expect("threads start");
+        let mut frame = Frame::new(32, 18);
+        // What a frame does is told, so that time has no say in it.
+        let mut say = |scene: &Scene, images, divisor| {
+            let budget = Budget::Replay(FrameRecord {
+                images,
+                divisor,
+                ..FrameRecord::default()
+            });
+            let stats = engine.render(scene, budget, &mut frame);
+            let json = frame_json(1, &stats);
+            let [outcome, age, divisor] =
+                ["outcome", "age", "divisor"].map(|key| json[key].clone());
+            (super::outcome(&stats), json!([outcome, age, divisor]))
+        };
+        let mut moved = scene.clone();
+        let mut camera = *moved.camera();
+        camera.position.z += 1.0;
+        moved.set_camera(camera);
+        for (scene, images, divisor, words, values) in [
+            (&scene, 0, 1, "no image yet", json!(["stale", null, 1])),
+            (&scene, 1, 3, "reduced to 1/3", json!(["reduced", 0, 3])),
+            (&moved, 0, 1, "stale by 1 frame", json!(["stale", 1, 3])),
+            (&moved, 0, 1, "stale by 2 frames", json!(["stale", 2, 3])),
+            (&moved, 1, 1, "base only", json!(["base_only", 0, 1])),
+        ] {
+            assert_eq!(say(scene, images, divisor), (words.to_owned(), values));
+        }
+    }
+}

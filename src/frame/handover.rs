@@ -86,6 +86,12 @@ impl Handover {
         self.handed_over.push_front(target.stamp());
     }
 
+    /// Leaves `target` as it is.
+    pub(super) fn leave_alone(&mut self, target: &Target<'_>) {
+        self.changed.clear();
+        self.note(target);
+    }
+
     /// Brings `target` up to the image of `picture`. Returns the number of pixels written.
     pub(super) fn present(
         &mut self,

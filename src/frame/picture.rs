@@ -59,8 +59,8 @@ pub(super) struct Picture {
     is_fresh: bool,
     /// What the stage in hand has taken in earlier frames, and in this one so far.
     stage_ms: f64,
-    /// The frame whose camera and scene it shows; `None` before it is begun.
-    taken_in: Option<u64>,
+    /// The last frame whose scene and camera the image is of; `None` before it is begun.
+    right_in: Option<u64>,
 }
 
 /// What drawing needs besides the picture itself.
@@ -117,7 +117,7 @@ impl Picture {
             pass: Pass::Empty,
             is_fresh: true,
             stage_ms: 0.0,
-            taken_in: None,
+            right_in: None,
         }
     }
 
@@ -131,7 +131,7 @@ impl Picture {
     /// Forgets who owns which pixel, as after objects have moved.
     pub(super) fn forget(&mut self) {
         self.enter(Pass::Empty);
-        self.taken_in = None;
+        self.right_in = None;
     }
 
     /// Forgets colours, as after lights have changed.
@@ -139,7 +139,7 @@ impl Picture {
         if self.pass > Pass::Lighting {
             self.enter(Pass::Lighting);
         }
-        self.taken_in = None;
+        self.right_in = None;
     }
 
     /// Whether the first image of `view` is complete.
@@ -214,20 +214,20 @@ impl Picture {
         method.is_progressive() && !self.backend.capabilities().refines_in_place()
     }
 
-    /// Begins the first image of a view, or goes on with it if it is in hand. `frame` is the number of the frame. What is known
-    /// about the view already is not done again.
-    pub(super) fn begin(&mut self, view: View, divisor: u32, frame: u64) {
+    /// Begins the first image of a view, or goes on with it if it is in hand. `frame` is the number of the frame whose scene and
+    /// camera these are, if it is the present one. What is known about the view already is not done again.
+    pub(super) fn begin(&mut self, view: View, divisor: u32, frame: Option<u64>) {
         if self.view != Some(view) {
             self.forget();
             self.view = Some(view);
             self.divisor = divisor;
         }
-        self.taken_in.get_or_insert(frame);
+        self.right_in = frame.or(self.right_in);
     }
 
-    /// How many frames before `frame` its camera and scene were the ones to be shown.
-    pub(super) fn age(&self, frame: u64) -> u64 {
-        frame.saturating_sub(self.taken_in.unwrap_or(frame))
+    /// The last frame whose scene and camera its first image is of, as far as it was in hand then.
+    pub(super) fn right_in(&self) -> Option<u64> {
+        self.right_in
     }
 
     /// Goes on with the first image until it lacks at most its colours: then true. False when time is up before.

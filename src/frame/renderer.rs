@@ -68,6 +68,8 @@ struct Commission {
     size: Size,
     view: View,
     divisor: u32,
+    /// Whether it is of the scene and the camera as they are, and not as they were when it was begun.
+    is_asked_for: bool,
 }
 
 impl Renderer {
@@ -110,6 +112,7 @@ impl Renderer {
         let is_current = self.is_current(scene, target);
         let mut drawing_ms = None;
         if is_current {
+            self.shelf.note_right(self.frames + 1);
             drawing_ms = self.refine(Some(target), &mut work);
         }
         let pixels_written = self.hand_over(&mut work, target);
@@ -117,8 +120,8 @@ impl Renderer {
         self.frames += 1;
         let is_up_to_date = self.placement.is_up_to_date(scene);
         self.last_view = is_up_to_date.then(|| self.view(scene, target));
-        let mut stats = self.report(budget, &work);
-        stats.outcome = self.outcome(is_current, &work, drawing_ms.is_some());
+        let mut stats = self.report(budget, &work, is_current);
+        stats.outcome = self.outcome(is_current, target, &work, drawing_ms.is_some());
         stats.pixels_written = pixels_written;
         let pixels = u64::from(asked.width) * u64::from(asked.height);
         stats.skipped.pixels_unchanged = pixels.saturating_sub(pixels_written);
@@ -185,11 +188,11 @@ impl Renderer {
             let is_asked_for = self.placement.is_up_to_date(scene)
                 && view == self.view(scene, target).reduced(own_divisor);
             if is_asked_for || own_divisor == divisor {
-                let divisor = own_divisor;
                 return Some(Commission {
                     size,
                     view,
-                    divisor,
+                    divisor: own_divisor,
+                    is_asked_for,
                 });
             }
             self.shelf.abandon(size);
@@ -198,16 +201,16 @@ impl Renderer {
         let full = self.view(scene, target);
         work.knew_owners |=
             work.allowance.record().images == 0 && self.shelf.full().knows_owners(&full);
-        if self.shelf.shows(Size::Full, &full) {
+        if self.shelf.show(Size::Full, &full) {
             return None;
         }
         let small = full.reduced(divisor);
-        if divisor > 1 && !self.shelf.shows(Size::Reduced, &small) {
-            let (size, view) = (Size::Reduced, small);
+        if divisor > 1 && !self.shelf.show(Size::Reduced, &small) {
             return Some(Commission {
-                size,
-                view,
+                size: Size::Reduced,
+                view: small,
                 divisor,
+                is_asked_for: true,
             });
         }
         // While the view stays, the full resolution follows.
@@ -215,6 +218,7 @@ impl Renderer {
             size: Size::Full,
             view: full,
             divisor: 1,
+            is_asked_for: true,
         })
     }
 
@@ -231,11 +235,15 @@ impl Renderer {
             size,
             view,
             divisor,
+            is_asked_for,
         } = *image;
         // What was left over for a frame of its own is not left over again.
         let is_due = |pass| is_first && self.shelf.pass(size) == pass;
         let (is_colouring_due, is_showing_due) = (is_due(Pass::Colouring), is_due(Pass::Coloured));
-        self.shelf.begin(size, view, divisor, self.frames + 1);
+        // In spare time there is no target, and what was asked for in the last frame still is.
+        let frame = self.frames + u64::from(target.is_some());
+        let frame = is_asked_for.then_some(frame);
+        self.shelf.begin(size, view, divisor, frame);
         self.reserve_handing_over(target, work);
 
         let (handing_over_ms, resolve_ms) = self.ending_ms(&view, divisor, target);
@@ -390,14 +398,14 @@ impl Renderer {
     /// Hands the image shown over; returns the number of pixels written.
     fn hand_over(&mut self, work: &mut Work<'_>, target: &mut Target<'_>) -> u64 {
         let since = work.allowance.elapsed_ms();
-        let asked = [target.width(), target.height()];
-        if asked.iter().any(|&side| side > MAX_IMAGE_SIDE) {
+        if target.width().max(target.height()) > MAX_IMAGE_SIDE {
+            self.handover.leave_alone(target);
             return 0;
         }
-        // An image for a target of another size does not fit into this one.
-        let shown = self.shelf.shown_mut().filter(|picture| {
-            picture.size() == Some(asked.map(|side| side.div_ceil(picture.divisor)))
-        });
+        let shown = self
+            .shelf
+            .shown_mut()
+            .filter(|picture| fits(picture, target));
         let divisor = shown.as_ref().map_or(1, |picture| picture.divisor);
         let pixels = match shown {
             Some(picture) => self.handover.present(work.exec, picture, target),
@@ -434,33 +442,46 @@ impl Renderer {
         self.unfinished_image().is_none() && self.shelf.shown().is_some_and(is_final)
     }
 
-    /// The first image in hand; or, when the view of the last frame is shown at a lower resolution, that at the full one.
+    /// The first image in hand; or that of the last frame's view, when that is not shown at full resolution.
     fn unfinished_image(&self) -> Option<Commission> {
         if let Some((size, view, divisor)) = self.shelf.view_in_hand() {
+            let last = self.last_view.map(|last| last.reduced(divisor));
             return Some(Commission {
                 size,
                 view,
                 divisor,
+                is_asked_for: last == Some(view),
             });
         }
-        let view = self.last_view?;
-        let is_reduced = self.method.divisor().is_none()
-            && self.shelf.shown_size() == Some(Size::Reduced)
-            && !self.shelf.shows(Size::Full, &view);
-        is_reduced.then_some(Commission {
-            size: Size::Full,
+        // Nothing is shown when it has been forgotten, or there has been no time for any image so far.
+        let size = self.shelf.shown_size()?;
+        let (divisor, wanted) = match self.method.divisor() {
+            Some(divisor) => (divisor, Size::Reduced),
+            None => (1, Size::Full),
+        };
+        let view = self.last_view?.reduced(divisor);
+        let is_there = size == wanted && self.shelf.shows(wanted, &view);
+        (!is_there).then_some(Commission {
+            size: wanted,
             view,
-            divisor: 1,
+            divisor,
+            is_asked_for: true,
         })
     }
 
-    fn outcome(&self, is_current: bool, work: &Work<'_>, has_drawn: bool) -> Outcome {
+    fn outcome(
+        &self,
+        is_current: bool,
+        target: &Target<'_>,
+        work: &Work<'_>,
+        has_drawn: bool,
+    ) -> Outcome {
         let record = work.allowance.record();
         let is_new = record.images > 0;
         match self.shelf.shown() {
             None => Outcome::Stale { age: None },
             Some(picture) if !is_current => Outcome::Stale {
-                age: Some(picture.age(self.frames)),
+                age: fits(picture, target).then(|| self.shelf.age(self.frames)),
             },
             Some(picture) if picture.divisor != self.method.divisor().unwrap_or(1) => {
                 Outcome::Reduced
@@ -475,7 +496,7 @@ impl Renderer {
     }
 
     /// What has been done, and what the image shown consists of.
-    fn report(&self, budget: Budget, work: &Work<'_>) -> FrameStats {
+    fn report(&self, budget: Budget, work: &Work<'_>, is_current: bool) -> FrameStats {
         let mut stats = FrameStats {
             frame: self.frames,
             frame_ms: work.allowance.elapsed_ms(),
@@ -491,10 +512,17 @@ impl Renderer {
             // An image that is being drawn anew, though its colours still are the old ones, has lost what was known about it.
             if picture.view().is_some() {
                 picture.report(self.method, &mut stats);
-                stats.converged = picture.has_converged(self.method)
+                stats.converged = is_current
+                    && picture.has_converged(self.method)
                     && picture.divisor == self.method.divisor().unwrap_or(1);
             }
         }
         stats
     }
+}
+
+/// Whether the picture's image is one for a target of this size.
+fn fits(picture: &Picture, target: &Target<'_>) -> bool {
+    let size = [target.width(), target.height()].map(|side| side.div_ceil(picture.divisor));
+    picture.size() == Some(size)
 }

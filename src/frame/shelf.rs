@@ -1,4 +1,5 @@
-//! The engine's pictures: one at full resolution, and one at a lower one for when that does not fit into a budget.
+//! The engine's pictures: one at full resolution, and one at a lower one for when that does not fit into a budget; and when that
+//! one is to have another size, a third, so that it can still be shown until its successor is complete.
 //!
 //! At most one of them is **in hand**: its first image has been begun and not completed. At most one is **shown**: its image is the one
 //! handed over, and refined. It may be in hand at the same time, as long as the colours of the image before are there.
@@ -12,6 +13,8 @@ use crate::scene::View;
 pub(super) enum Size {
     Full,
     Reduced,
+    /// Another lower resolution, which the image shown has while one of [`Reduced`](Self::Reduced) is drawn.
+    Former,
 }
 
 /// The pictures. See the [module](self).
@@ -20,9 +23,13 @@ pub(super) struct Shelf {
     full: Picture,
     /// Made when it is needed first.
     reduced: Option<Picture>,
+    /// The same.
+    former: Option<Picture>,
     /// Whether there can be another picture.
     can_reduce: bool,
     shown: Option<Size>,
+    /// The last frame whose scene and camera the image shown is of.
+    right_in: u64,
 }
 
 impl Shelf {
@@ -31,7 +38,9 @@ impl Shelf {
             can_reduce: backend.sibling().is_some(),
             full: Picture::new(backend),
             reduced: None,
+            former: None,
             shown: None,
+            right_in: 0,
         }
     }
 
@@ -44,28 +53,40 @@ impl Shelf {
         &self.full
     }
 
-    /// The picture of that size, if there is one.
+    /// The picture of that size, if there is one; the one at full resolution where there can be no other.
     pub(super) fn get(&self, size: Size) -> Option<&Picture> {
         match size {
-            Size::Full => Some(&self.full),
-            Size::Reduced => self.reduced.as_ref(),
+            Size::Reduced if self.can_reduce => self.reduced.as_ref(),
+            Size::Former if self.can_reduce => self.former.as_ref(),
+            _ => Some(&self.full),
         }
     }
 
-    /// The picture of that size, made if need be; the one at full resolution where there can be no other.
+    fn get_mut(&mut self, size: Size) -> Option<&mut Picture> {
+        match size {
+            Size::Reduced if self.can_reduce => self.reduced.as_mut(),
+            Size::Former if self.can_reduce => self.former.as_mut(),
+            _ => Some(&mut self.full),
+        }
+    }
+
+    /// The picture of that size, made if need be.
     pub(super) fn get_or_make(&mut self, size: Size) -> &mut Picture {
-        if size == Size::Full {
-            return &mut self.full;
+        let picture = match size {
+            Size::Reduced if self.can_reduce => &mut self.reduced,
+            Size::Former if self.can_reduce => &mut self.former,
+            _ => return &mut self.full,
+        };
+        if picture.is_none() {
+            *picture = self.full.backend.sibling().map(Picture::new);
         }
-        if self.reduced.is_none() {
-            let backend = self.full.backend.sibling();
-            self.reduced = backend.map(Picture::new);
-        }
-        self.reduced.as_mut().unwrap_or(&mut self.full)
+        picture.as_mut().unwrap_or(&mut self.full)
     }
 
     fn pictures(&mut self) -> impl Iterator<Item = &mut Picture> {
-        std::iter::once(&mut self.full).chain(&mut self.reduced)
+        std::iter::once(&mut self.full)
+            .chain(&mut self.reduced)
+            .chain(&mut self.former)
     }
 
     /// Takes note that objects have moved.
@@ -85,11 +106,9 @@ impl Shelf {
 
     /// Gives the image in hand of that size up.
     pub(super) fn abandon(&mut self, size: Size) {
-        let picture = match size {
-            Size::Full => Some(&mut self.full),
-            Size::Reduced => self.reduced.as_mut(),
-        };
-        picture.into_iter().for_each(Picture::forget);
+        if let Some(picture) = self.get_mut(size) {
+            picture.forget();
+        }
     }
 
     /// Forgets all images, and what was found out about triangles; there is none to be shown.
@@ -119,20 +138,47 @@ impl Shelf {
         self.get(size).is_some_and(|picture| picture.shows(view))
     }
 
-    /// Begins an image, or goes on with it. The one shown is lost if it was in the same picture and of another size.
-    pub(super) fn begin(&mut self, size: Size, view: View, divisor: u32, frame: u64) {
-        let picture = self.get_or_make(size);
-        let is_lost = picture.size() != Some([view.width, view.height]);
-        picture.begin(view, divisor, frame);
-        if is_lost && self.shown == Some(size) {
+    /// Begins an image, or goes on with it. The one shown is lost if it was at full resolution and of another size.
+    pub(super) fn begin(&mut self, size: Size, view: View, divisor: u32, frame: Option<u64>) {
+        let is_shown = self.shown == Some(size);
+        let is_alike = |picture: &Picture| {
+            picture.divisor == divisor && picture.size() == Some([view.width, view.height])
+        };
+        if is_shown && !self.get(size).is_some_and(is_alike) {
             self.shown = None;
+            if size == Size::Reduced && self.can_reduce {
+                std::mem::swap(&mut self.reduced, &mut self.former);
+                self.shown = Some(Size::Former);
+            }
         }
+        self.get_or_make(size).begin(view, divisor, frame);
     }
 
     /// Shows the picture of that size, whose first image has got its colours.
     pub(super) fn publish(&mut self, size: Size) {
-        self.get_or_make(size).publish();
+        let picture = self.get_or_make(size);
+        picture.publish();
+        self.right_in = picture.right_in().unwrap_or(0);
         self.shown = Some(size);
+    }
+
+    /// Shows the picture of that size again if it shows `view`. Whether it does.
+    pub(super) fn show(&mut self, size: Size, view: &View) -> bool {
+        let does_show = self.shows(size, view);
+        if does_show {
+            self.shown = Some(size);
+        }
+        does_show
+    }
+
+    /// Takes note that the image shown is the one asked for in frame number `frame`.
+    pub(super) fn note_right(&mut self, frame: u64) {
+        self.right_in = frame;
+    }
+
+    /// How many frames before `frame` the scene and camera were those of the image shown.
+    pub(super) fn age(&self, frame: u64) -> u64 {
+        frame.saturating_sub(self.right_in)
     }
 
     /// The size of the picture shown.
@@ -147,10 +193,7 @@ impl Shelf {
 
     /// The picture shown.
     pub(super) fn shown_mut(&mut self) -> Option<&mut Picture> {
-        match self.shown? {
-            Size::Full => Some(&mut self.full),
-            Size::Reduced => self.reduced.as_mut(),
-        }
+        self.get_mut(self.shown?)
     }
 
     /// How far the first image of the picture of that size has come.

@@ -14,13 +14,14 @@
 //! their pixels.
 
 use super::metrics::ErrorHistogram;
+use super::predictions::{PredictionErrors, Predictions};
 use super::reference::ReferenceImage;
 use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
 use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method, Overrun, StageTimes};
 use crate::output::{Encoding, Frame};
 use crate::scene::{Camera, Scene};
-use crate::schedule::Budget;
+use crate::schedule::{Budget, CostModel};
 use crate::simd::SimdLevel;
 use glam::{DMat3, DVec3};
 use serde::Serialize;
@@ -54,6 +55,8 @@ pub struct BenchOptions {
     pub simd: Option<SimdLevel>,
     /// Where time comes from.
     pub clock: Arc<dyn Clock>,
+    /// What is known about costs; see [`EngineOptions::costs`].
+    pub costs: Option<CostModel>,
 }
 
 impl Default for BenchOptions {
@@ -71,6 +74,7 @@ impl Default for BenchOptions {
             encoding: Encoding::default(),
             simd: None,
             clock: Arc::new(SystemClock::new()),
+            costs: None,
         }
     }
 }
@@ -141,6 +145,10 @@ pub struct BenchReport {
     pub frame_ms_max: f64,
     /// Mean milliseconds by stage.
     pub stage_ms: StageTimes,
+    /// How far what the engine predicted that stages take was off in the median frame.
+    pub prediction_error_median: PredictionErrors,
+    /// 95 % of frames were off no further.
+    pub prediction_error_p95: PredictionErrors,
     /// Frames that ended after their deadline; `None` without a wall-clock budget, as are the overshoots.
     pub late_frames: Option<u64>,
     /// Median milliseconds past the deadline, negative when early.
@@ -169,6 +177,9 @@ pub struct BenchReport {
     pub rmse: Option<f64>,
     /// The same in decibels; `None` also where there is no error.
     pub psnr_db: Option<f64>,
+    /// What the engine knew about costs in the end.
+    #[serde(skip)]
+    pub costs: CostModel,
 }
 
 /// Renders `scene`, which the report calls `name`, from all around. `on_frame` is told of every frame finished.
@@ -191,6 +202,7 @@ pub fn bench(
             simd: options.simd,
             clock: Arc::clone(&options.clock),
             overrun: Overrun::BeLate,
+            costs: options.costs.clone(),
             ..EngineOptions::default()
         },
     )?;
@@ -294,6 +306,7 @@ impl Turntable {
 struct Totals {
     frame_ms: Vec<f64>,
     stage_ms: StageTimes,
+    predictions: Predictions,
     converged: u64,
     triangles_drawn: u64,
     triangles_visible: u64,
@@ -306,6 +319,7 @@ impl Totals {
     fn add(&mut self, stats: &FrameStats) {
         self.frame_ms.push(stats.frame_ms);
         self.stage_ms.add_scaled(&stats.stage_ms, 1.0);
+        self.predictions.add(&stats.predicted_ms, &stats.stage_ms);
         self.converged += u64::from(stats.converged);
         self.triangles_drawn += stats.triangles_drawn;
         self.triangles_visible += stats.triangles_visible;
@@ -346,6 +360,8 @@ impl Totals {
             frame_ms_p99: quantile(times, 99),
             frame_ms_max: quantile(times, 100),
             stage_ms,
+            prediction_error_median: self.predictions.quantile(50),
+            prediction_error_p95: self.predictions.quantile(95),
             late_frames: budget_ms
                 .map(|budget| times.iter().filter(|&&ms| ms > budget).count() as u64),
             overshoot_ms_median: overshoot(50),
@@ -361,12 +377,13 @@ impl Totals {
             compared_views: 0,
             rmse: None,
             psnr_db: None,
+            costs: turntable.engine.costs().clone(),
         }
     }
 }
 
 /// The smallest of ascending values that at least `percent` of them do not exceed; zero of nothing.
-fn quantile(ascending: &[f64], percent: usize) -> f64 {
+pub(super) fn quantile(ascending: &[f64], percent: usize) -> f64 {
     let rank = (ascending.len() * percent).div_ceil(100).max(1);
     ascending.get(rank - 1).copied().unwrap_or(0.0)
 }

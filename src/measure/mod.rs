@@ -8,6 +8,7 @@ pub mod flicker;
 pub mod inspection;
 pub mod metrics;
 pub mod overlay;
+pub mod predictions;
 pub mod reference;
 pub mod soak;
 pub mod sweep;
@@ -18,6 +19,7 @@ pub use flicker::flicker;
 pub use inspection::Inspection;
 pub use metrics::{ErrorHistogram, ErrorReport, Mismatch};
 pub use overlay::{Layer, draw_overlay};
+pub use predictions::PredictionErrors;
 pub use reference::ReferenceImage;
 pub use soak::{Soak, SoakOptions, SoakRow, SoakSummary};
 pub use sweep::{

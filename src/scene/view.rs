@@ -131,7 +131,10 @@ impl View {
     /// perhaps for fewer. Zero counts as one.
     #[must_use]
     pub fn reduced(self, divisor: u32) -> Self {
-        let divisor = divisor.max(1);
+        if divisor <= 1 {
+            // A product with one would turn -0 into 0, which is another view.
+            return self;
+        }
         let shrink = DVec3::new(1.0 / f64::from(divisor), 1.0 / f64::from(divisor), 1.0);
         Self {
             width: self.width.div_ceil(divisor),

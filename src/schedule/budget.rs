@@ -1,6 +1,6 @@
 //! What a frame may cost, and how much of it is left.
 
-use super::{CancelToken, FrameRecord};
+use super::{CancelToken, DIVISORS, FrameRecord};
 use crate::clock::Clock;
 
 /// What one frame may cost.
@@ -130,7 +130,12 @@ impl<'a> Allowance<'a> {
     #[must_use]
     pub fn replayed_divisor(&self) -> Option<u32> {
         match self.budget {
-            Budget::Replay(record) => Some(record.divisor),
+            // Records come from files, too.
+            Budget::Replay(record) => Some(
+                record
+                    .divisor
+                    .clamp(DIVISORS[0], DIVISORS[DIVISORS.len() - 1]),
+            ),
             _ => None,
         }
     }

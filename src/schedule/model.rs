@@ -159,6 +159,13 @@ impl Rate {
         self.predict_ms(load) * (1.0 + CAUTION * self.spread)
     }
 
+    /// Whether both parts are positive numbers of a sensible size, which those of a file need not be.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let is_rate = |value: f64| (LEAST_RATE..=1.0 / LEAST_RATE).contains(&value);
+        is_rate(self.items) && is_rate(self.pixels) && (0.0..=1.0).contains(&self.spread)
+    }
+
     /// Takes note that the work took `ms` milliseconds. What is no positive number is ignored, and so is too little work.
     pub fn learn(&mut self, load: Load, ms: f64) {
         let predicted = self.predict_ms(load);
@@ -240,14 +247,10 @@ impl CostModel {
         self.rate_mut(kind).doubt();
     }
 
-    /// Whether all rates are positive numbers, which those of a file need not be.
+    /// Whether all rates are [valid](Rate::is_valid).
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        let is_rate = |value: f64| (LEAST_RATE..=1.0 / LEAST_RATE).contains(&value);
-        Kind::ALL.into_iter().all(|kind| {
-            let rate = self.rate(kind);
-            is_rate(rate.items) && is_rate(rate.pixels) && (0.0..=1.0).contains(&rate.spread)
-        })
+        Kind::ALL.into_iter().all(|kind| self.rate(kind).is_valid())
     }
 
     /// The rate of a kind of work.

@@ -1,5 +1,6 @@
 //! What can be said to `specula compare`.
 
+use crate::cli::Failure;
 use crate::cli::args::{Machine, MethodOrAll, count, fraction, milliseconds, selected};
 use clap::Args;
 use specula::measure::SweepOptions;
@@ -72,8 +73,8 @@ pub(in crate::cli) struct Compare {
 }
 
 impl Compare {
-    pub(super) fn options(&self) -> SweepOptions {
-        SweepOptions {
+    pub(super) fn options(&self) -> Result<SweepOptions, Failure> {
+        Ok(SweepOptions {
             width: self.machine.size.width,
             height: self.machine.size.height,
             methods: selected(&self.methods),
@@ -82,7 +83,8 @@ impl Compare {
             backend: self.machine.backend,
             encoding: self.encoding,
             simd: self.machine.simd,
+            costs: self.machine.costs()?,
             ..SweepOptions::default()
-        }
+        })
     }
 }

@@ -25,7 +25,7 @@ use specula::scene::Scene;
 pub(super) fn run(args: &Compare) -> Result<(), Failure> {
     require_png(&args.output)?;
     let scene = Scene::load(&args.scene)?;
-    let options = args.options();
+    let options = args.options()?;
     let can_calibrate = options.backend.create().capabilities().per_pixel;
     if args.budget.is_none() && !can_calibrate {
         return Err(Failure::input(format!(

@@ -1,5 +1,6 @@
 //! What can be said to `specula sweep`.
 
+use crate::cli::Failure;
 use crate::cli::args::{Machine, MethodOrAll, count, fraction, milliseconds, selected};
 use clap::Args;
 use specula::measure::SweepOptions;
@@ -95,8 +96,8 @@ pub(in crate::cli) struct Sweep {
 }
 
 impl Sweep {
-    pub(super) fn options(&self) -> SweepOptions {
-        SweepOptions {
+    pub(super) fn options(&self) -> Result<SweepOptions, Failure> {
+        Ok(SweepOptions {
             width: self.machine.size.width,
             height: self.machine.size.height,
             methods: selected(&self.methods),
@@ -106,7 +107,8 @@ impl Sweep {
             backend: self.machine.backend,
             encoding: self.encoding,
             simd: self.machine.simd,
+            costs: self.machine.costs()?,
             ..SweepOptions::default()
-        }
+        })
     }
 }

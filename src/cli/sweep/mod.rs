@@ -32,7 +32,7 @@ pub(super) fn run(args: &Sweep) -> Result<(), Failure> {
         .iter()
         .map(|path| Ok((name_of(path), Scene::load(path)?)))
         .collect::<Result<Vec<_>, Failure>>()?;
-    let options = args.options();
+    let options = args.options()?;
     if args.budgets.is_empty() && !can_shade_pixels(&options) {
         return Err(Failure::input(format!(
             "fractions are of the time of Phong shading, which the backend '{}' cannot do: give --budgets",

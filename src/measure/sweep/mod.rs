@@ -25,7 +25,7 @@ use crate::clock::{Clock, SystemClock};
 use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method, Overrun};
 use crate::output::{Encoding, Frame};
 use crate::scene::Scene;
-use crate::schedule::Budget;
+use crate::schedule::{Budget, CostModel};
 use crate::simd::SimdLevel;
 use calibration::Calibrator;
 use std::ops::ControlFlow;
@@ -56,6 +56,8 @@ pub struct SweepOptions {
     pub simd: Option<SimdLevel>,
     /// Where time comes from.
     pub clock: Arc<dyn Clock>,
+    /// What is known about costs; see [`EngineOptions::costs`].
+    pub costs: Option<CostModel>,
 }
 
 impl Default for SweepOptions {
@@ -72,6 +74,7 @@ impl Default for SweepOptions {
             encoding: Encoding::default(),
             simd: None,
             clock: Arc::new(SystemClock::new()),
+            costs: None,
         }
     }
 }
@@ -88,6 +91,7 @@ impl SweepOptions {
                 simd: self.simd,
                 clock: Arc::clone(&self.clock),
                 overrun: Overrun::BeLate,
+                costs: self.costs.clone(),
                 ..EngineOptions::default()
             },
         )
