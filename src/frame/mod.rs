@@ -10,6 +10,7 @@ mod engine;
 mod handover;
 mod load;
 mod method;
+mod motion;
 mod options;
 mod picture;
 mod refine_first;
