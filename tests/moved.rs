@@ -117,6 +117,10 @@ impl Subject {
         let view = self.world.view(self.scene.camera(), SIZE.0, SIZE.1);
         assert_eq!(view, self.view, "the camera has moved");
         self.culler.cull(&self.view, &mut self.visible);
+        // Culling may come to other results about what is still.
+        if random.below(3) == 0 {
+            self.visible.remove(random.below(self.visible.len()));
+        }
         changes.shading || changes.background
     }
 
