@@ -95,6 +95,8 @@ pub struct RasterCounts {
     pub covered_pixels: u64,
     /// Tiles without any covered pixel, where a backend has such a thing.
     pub background_tiles: u64,
+    /// Tiles with covered pixels that were kept from the image before, because nothing moved there.
+    pub kept_tiles: u64,
 }
 
 /// How the whole image gets its colours.
@@ -169,7 +171,8 @@ pub enum Fill {
 ///
 /// **Several calls for one image.** [`rasterize_while`](Self::rasterize_while) and [`resolve_while`](Self::resolve_while) are
 /// [turns](Turn) of what `rasterize` and `resolve` do at once, with the same results, bit for bit. Later turns of the same
-/// work come with the same geometry and paint. Until it is complete, nothing else may be asked but what begins
+/// work come with the same geometry and paint; so it is with [`rasterize_moved`](Self::rasterize_moved) and
+/// [`resolve_moved`](Self::resolve_moved), which stand in for them where little has changed. Until it is complete, nothing else may be asked but what begins
 /// anew: `rasterize`, or the first turn of `rasterize_while`, at any time; `resolve`, or the first turn of `resolve_while`, when
 /// the image has been rasterized. Only [`present`](Self::present), and what tells what it would do, may be called at any time: until an
 /// image of the same size gets its first colours, the image before it is handed over.
@@ -225,6 +228,23 @@ pub trait Backend: Debug + Send {
         Some(self.rasterize(exec, geometry))
     }
 
+    /// As [`rasterize_while`](Self::rasterize_while), for an image of the same world and view as the last one, in which nothing has moved
+    /// since but corners of the triangles in `moved`, which ascend. The result is the same, bit for bit. Later turns come with
+    /// the same `moved`.
+    ///
+    /// The last image may also have been given up, and its view may have been another one; then as for any image, everything
+    /// is found out anew. So does a backend that keeps nothing.
+    fn rasterize_moved(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        moved: &[Range<u32>],
+        turn: Turn<'_>,
+    ) -> Option<RasterCounts> {
+        let _ = moved;
+        self.rasterize_while(exec, geometry, turn)
+    }
+
     /// The triangles whose vertices have to be illuminated, ascending. With ids: those that own a pixel. Without:
     /// those that face the viewer and may touch the centre of a pixel, whether something hides
     /// them or not.
@@ -251,6 +271,21 @@ pub trait Backend: Debug + Send {
         let _ = turn;
         self.resolve(exec, geometry, paint);
         true
+    }
+
+    /// As [`resolve_while`](Self::resolve_while), where illumination is what it was when colours of the same kind were begun last:
+    /// the same lights, materials and background. So colours have changed only where triangles have [moved](Self::rasterize_moved),
+    /// have other owners' pixels, or have been repainted. The result is the same, bit for bit.
+    ///
+    /// A backend that keeps nothing colours everything.
+    fn resolve_moved(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        paint: BasePaint<'_>,
+        turn: Turn<'_>,
+    ) -> bool {
+        self.resolve_while(exec, geometry, paint, turn)
     }
 
     /// With ids: paints exactly the pixels that each patch's triangle owns inside the patch, and counts them in

@@ -22,12 +22,13 @@
 use super::{Backend, BasePaint, Capabilities, Geometry, Patch, RasterCounts, RefinedPart};
 use crate::output::{Rect, Target};
 use crate::parallel::{Exec, Turn};
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// One call of a method that changes something; of several [turns](Turn) of the same work, the one that completes it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Call {
-    /// [`Backend::rasterize`] or [`Backend::rasterize_while`].
+    /// [`Backend::rasterize`], [`Backend::rasterize_while`] or [`Backend::rasterize_moved`].
     Rasterize {
         /// Image width and height in pixels.
         size: [u32; 2],
@@ -36,7 +37,7 @@ pub enum Call {
         /// Triangles that were found to be visible.
         visible: Vec<u32>,
     },
-    /// [`Backend::resolve`] or [`Backend::resolve_while`].
+    /// [`Backend::resolve`], [`Backend::resolve_while`] or [`Backend::resolve_moved`].
     Resolve(Paint),
     /// [`Backend::repaint`].
     Repaint {
@@ -151,6 +152,18 @@ impl Backend for RecordingBackend {
         Some(counts)
     }
 
+    fn rasterize_moved(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        moved: &[Range<u32>],
+        turn: Turn<'_>,
+    ) -> Option<RasterCounts> {
+        let counts = self.inner.rasterize_moved(exec, geometry, moved, turn)?;
+        self.log_rasterize(geometry, counts);
+        Some(counts)
+    }
+
     fn visible_triangles(&self) -> &[u32] {
         self.inner.visible_triangles()
     }
@@ -172,6 +185,20 @@ impl Backend for RecordingBackend {
         turn: Turn<'_>,
     ) -> bool {
         let is_complete = self.inner.resolve_while(exec, geometry, paint, turn);
+        if is_complete {
+            self.log_resolve(paint);
+        }
+        is_complete
+    }
+
+    fn resolve_moved(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        paint: BasePaint<'_>,
+        turn: Turn<'_>,
+    ) -> bool {
+        let is_complete = self.inner.resolve_moved(exec, geometry, paint, turn);
         if is_complete {
             self.log_resolve(paint);
         }

@@ -45,15 +45,23 @@ impl BaseImage {
         self.culled = culler.cull(view, &mut self.visible);
     }
 
+    /// One turn of finding the owner of every pixel. `moved` are the triangles that have moved since that was done for the last
+    /// image, if its other pixels may keep theirs. False if it was told to stop.
     pub(super) fn rasterize(
         &mut self,
         exec: Exec,
         world: &World,
         view: &View,
         backend: &mut dyn Backend,
+        moved: Option<&[Range<u32>]>,
         turn: Turn<'_>,
     ) -> bool {
-        let Some(counts) = backend.rasterize_while(exec, self.geometry(world, view), turn) else {
+        let geometry = self.geometry(world, view);
+        let counts = match moved {
+            Some(moved) => backend.rasterize_moved(exec, geometry, moved, turn),
+            None => backend.rasterize_while(exec, geometry, turn),
+        };
+        let Some(counts) = counts else {
             return false;
         };
         self.raster = counts;
@@ -64,6 +72,11 @@ impl BaseImage {
     /// Triangles in clusters that were not culled.
     pub(super) fn triangles_handed_over(&self) -> u64 {
         u64::from(self.culled.triangles)
+    }
+
+    /// Whether nothing has been kept of the image before.
+    pub(super) fn is_whole(&self) -> bool {
+        self.raster.kept_tiles == 0
     }
 
     /// Triangles that own a pixel.
@@ -127,7 +140,12 @@ impl BaseImage {
         }
     }
 
-    /// One turn of giving the image its colours. False if it was told to stop.
+    /// One turn of giving the image its colours, or those parts of it that have changed if it `has_its_light`. False if it was told to
+    /// stop.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "what is painted, how, and on what"
+    )]
     pub(super) fn resolve(
         &mut self,
         exec: Exec,
@@ -135,6 +153,7 @@ impl BaseImage {
         world: &World,
         view: &View,
         backend: &mut dyn Backend,
+        has_its_light: bool,
         turn: Turn<'_>,
     ) -> bool {
         let paint = match method {
@@ -142,7 +161,12 @@ impl BaseImage {
             Method::Flat => BasePaint::Flat(&self.colours),
             _ => BasePaint::Gouraud(&self.colours),
         };
-        backend.resolve_while(exec, self.geometry(world, view), paint, turn)
+        let geometry = self.geometry(world, view);
+        if has_its_light {
+            backend.resolve_moved(exec, geometry, paint, turn)
+        } else {
+            backend.resolve_while(exec, geometry, paint, turn)
+        }
     }
 
     /// Fills in what the first image had to do and what it did not.
@@ -157,5 +181,6 @@ impl BaseImage {
         skipped.triangles_off_screen = self.raster.off_screen;
         skipped.triangles_hidden = self.raster.drawn.saturating_sub(self.visible_triangles);
         skipped.background_tiles = self.raster.background_tiles;
+        skipped.tiles_unmoved = self.raster.kept_tiles;
     }
 }

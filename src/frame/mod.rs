@@ -19,6 +19,7 @@ mod engine;
 mod handover;
 mod load;
 mod method;
+mod motion;
 mod options;
 mod picture;
 mod refine_first;

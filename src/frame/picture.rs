@@ -18,6 +18,7 @@
 use super::Method;
 use super::base::BaseImage;
 use super::load::{self, ImageLoad};
+use super::motion::Motion;
 use super::refine_first::RefineFirst;
 use super::refinement::{Refinement, Stage};
 use super::stats::{FrameStats, StageTimes};
@@ -28,6 +29,7 @@ use crate::parallel::{Exec, GoOn, Turn};
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, CostModel, Kind, Load};
 use crate::visibility::Culler;
+use std::ops::Range;
 
 /// How far the base pass has come; see the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,6 +57,8 @@ pub(super) struct Picture {
     /// One pixel stands for `divisor` by `divisor` pixels of the target.
     pub(super) divisor: u32,
     pass: Pass,
+    /// What of the image before may be kept.
+    motion: Motion,
     /// Whether the stage in hand is yet to be begun.
     is_fresh: bool,
     /// What the stage in hand has taken in earlier frames, and in this one so far.
@@ -115,6 +119,7 @@ impl Picture {
             view: None,
             divisor: 1,
             pass: Pass::Empty,
+            motion: Motion::default(),
             is_fresh: true,
             stage_ms: 0.0,
             right_in: None,
@@ -128,14 +133,23 @@ impl Picture {
         self.forget();
     }
 
-    /// Forgets who owns which pixel, as after objects have moved.
+    /// Forgets who owns which pixel.
     pub(super) fn forget(&mut self) {
         self.enter(Pass::Empty);
+        self.motion.forget();
+        self.right_in = None;
+    }
+
+    /// Forgets who owns the pixels that objects which have moved touch. `moved` are their triangles, ascending.
+    pub(super) fn move_objects(&mut self, moved: &[Range<u32>]) {
+        self.enter(Pass::Empty);
+        self.motion.add(moved);
         self.right_in = None;
     }
 
     /// Forgets colours, as after lights have changed.
     pub(super) fn forget_colours(&mut self) {
+        self.motion.has_its_light = false;
         if self.pass > Pass::Lighting {
             self.enter(Pass::Lighting);
         }
@@ -278,6 +292,7 @@ impl Picture {
                 studio.world,
                 &view,
                 &mut *self.backend,
+                self.motion.has_its_light,
                 turn,
             )
         };
@@ -288,6 +303,7 @@ impl Picture {
             return false;
         }
         studio.predicted.resolve += self.learn(studio.costs, Kind::Resolve, load);
+        self.motion.has_its_light = true;
         self.begin_refinement(studio, allowance, &view);
         self.enter(Pass::Coloured);
         true
@@ -394,13 +410,19 @@ impl Picture {
         let since = allowance.elapsed_ms();
         let go_on = || allowance.goes_on();
         let turn = self.turn(&go_on);
-        let is_done =
-            self.base
-                .rasterize(studio.exec, studio.world, view, &mut *self.backend, turn);
+        let is_done = self.base.rasterize(
+            studio.exec,
+            studio.world,
+            view,
+            &mut *self.backend,
+            self.motion.moved(),
+            turn,
+        );
         let ms = allowance.elapsed_ms() - since;
         studio.stages.raster += ms;
         self.stage_ms += ms;
         if is_done {
+            self.motion.begin();
             studio.load.visible = self.base.visible_triangles() as f64;
             let pixels = f64::from(view.width) * f64::from(view.height);
             studio.load.coverage = self.base.covered_pixels() as f64 / pixels.max(1.0);
@@ -446,10 +468,18 @@ impl Picture {
         }
     }
 
-    /// Learns from the stage that has ended, and returns what it had been predicted to take.
+    /// Learns from the stage that has ended, and returns what it had been predicted to take. What a whole image takes is not to be
+    /// learned from one of which parts were kept.
     fn learn(&self, costs: &mut CostModel, kind: Kind, load: Load) -> f64 {
         let predicted = costs.predict_ms(kind, load);
-        costs.learn(kind, load, self.stage_ms);
+        let is_whole = match kind {
+            Kind::Raster => self.base.is_whole(),
+            Kind::Resolve => self.base.is_whole() || !self.motion.has_its_light,
+            _ => true,
+        };
+        if is_whole {
+            costs.learn(kind, load, self.stage_ms);
+        }
         predicted
     }
 

@@ -354,7 +354,7 @@ impl Renderer {
             GeometryChange::None => {}
             GeometryChange::Moved => {
                 self.culler.refit(&self.world.clusters);
-                self.shelf.forget_owners();
+                self.shelf.move_objects(self.placement.moved());
             }
             GeometryChange::Replaced => {
                 self.culler = Culler::new(&self.world.clusters);

@@ -7,6 +7,7 @@
 use super::picture::{Pass, Picture};
 use crate::backend::Backend;
 use crate::scene::View;
+use std::ops::Range;
 
 /// Which picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,9 +90,10 @@ impl Shelf {
             .chain(&mut self.former)
     }
 
-    /// Takes note that objects have moved.
-    pub(super) fn forget_owners(&mut self) {
-        self.pictures().for_each(Picture::forget);
+    /// Takes note that the objects with these triangles, which ascend, have moved.
+    pub(super) fn move_objects(&mut self, moved: &[Range<u32>]) {
+        self.pictures()
+            .for_each(|picture| picture.move_objects(moved));
     }
 
     /// Takes note that lights, materials or the background are others.
@@ -113,9 +115,10 @@ impl Shelf {
 
     /// Forgets all images, and what was found out about triangles; there is none to be shown.
     pub(super) fn forget(&mut self) {
-        self.forget_owners();
-        self.pictures()
-            .for_each(|picture| picture.refinement.forget());
+        self.pictures().for_each(|picture| {
+            picture.forget();
+            picture.refinement.forget();
+        });
         self.shown = None;
     }
 

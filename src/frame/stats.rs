@@ -116,6 +116,8 @@ pub struct Skipped {
     pub light_terms: u64,
     /// Tiles that nothing covers.
     pub background_tiles: u64,
+    /// Covered tiles that were kept from the image before, because nothing moved there.
+    pub tiles_unmoved: u64,
     /// Covered pixels whose owners stayed known from the frame before: neither camera nor objects had moved.
     pub visibility_pixels: u64,
     /// Pixels of the caller's frame that were right already.
@@ -125,7 +127,7 @@ pub struct Skipped {
 impl Skipped {
     /// Names and values, in the order of the fields, for reports.
     #[must_use]
-    pub fn entries(&self) -> [(&'static str, u64); 11] {
+    pub fn entries(&self) -> [(&'static str, u64); 12] {
         [
             ("clusters_off_screen", self.clusters_off_screen),
             ("clusters_facing_away", self.clusters_facing_away),
@@ -136,6 +138,7 @@ impl Skipped {
             ("triangles_proved", self.triangles_proved),
             ("light_terms", self.light_terms),
             ("background_tiles", self.background_tiles),
+            ("tiles_unmoved", self.tiles_unmoved),
             ("visibility_pixels", self.visibility_pixels),
             ("pixels_unchanged", self.pixels_unchanged),
         ]

@@ -31,6 +31,8 @@ pub(super) struct Part {
     pub(super) place: DMat4,
     /// Whether that turns the mesh into its mirror image.
     pub(super) mirrors: bool,
+    /// Whether the last change of the scene moved it.
+    pub(super) has_moved: bool,
     /// Where it was when it came into the scene.
     pub(super) rest: DMat4,
     /// Whether it shares a position with another object at rest.
@@ -45,7 +47,7 @@ pub(super) struct Part {
 #[derive(Clone, Debug)]
 pub(super) struct Side {
     pub(super) vertices: Range<usize>,
-    triangles: Range<usize>,
+    pub(super) triangles: Range<usize>,
     clusters: Range<usize>,
 }
 
@@ -86,6 +88,7 @@ impl Part {
             material: 0,
             place: rest,
             mirrors,
+            has_moved: false,
             rest,
             touches: false,
             ball: ball(mesh),

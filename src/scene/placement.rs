@@ -22,6 +22,7 @@ use crate::geometry::Topology;
 use crate::math::power_of_two_scale;
 use crate::parallel::Exec;
 use glam::DVec3;
+use std::ops::Range;
 
 /// The scene may reach so many times as far as it does at rest before origin and scale change: two bits of the 24 of an
 /// `f32` are spent on that.
@@ -32,7 +33,7 @@ const ROOM: f64 = 4.0;
 pub struct Changes {
     /// What has become of vertices and triangles.
     pub geometry: GeometryChange,
-    /// Materials or lights are others.
+    /// Materials or lights are others. What has moved is lit otherwise even where this is false.
     pub shading: bool,
     /// The background is another.
     pub background: bool,
@@ -65,6 +66,8 @@ pub struct Placement {
     revisions: Revisions,
     parts: Vec<Part>,
     at_rest: Anchor,
+    /// What the last update moved.
+    moved: Vec<Range<u32>>,
     /// How far from its origin the scene may reach before it is given another, in author units.
     room: f64,
 }
@@ -100,6 +103,7 @@ impl Placement {
             }
         }
         world.backs = fronts..world.triangles.len() as u32;
+        world.object_starts = sides_in_order(&parts).map(|(_, side)| side.start).collect();
         let reach = parts
             .iter()
             .map(|part| part.reach(&part.rest, at_rest.origin));
@@ -107,6 +111,7 @@ impl Placement {
             revisions: scene.revisions,
             room: ROOM * reach.fold(0.0, f64::max),
             at_rest,
+            moved: Vec::with_capacity(world.object_starts.len()),
             parts,
         };
         placement.weld(&mut world, scene);
@@ -144,16 +149,23 @@ impl Placement {
             changes.shading = true;
             self.assign_materials(world, scene);
         }
-        // Which lights are far away depends on the size of the scene.
+        // Which lights are far away depends on the size of the scene, and where they are on its origin.
         if now.lights != known.lights || changes.geometry != GeometryChange::None {
-            changes.shading = true;
-            world.set_lights(&scene.lights);
+            let are_others = world.set_lights(&scene.lights);
+            changes.shading |= are_others || now.lights != known.lights;
         }
         if now.background != known.background {
             changes.background = true;
             world.set_background(scene.background);
         }
         changes
+    }
+
+    /// The triangles of the objects that the last [update](Self::update) moved, ascending, if it [moved](GeometryChange::Moved)
+    /// any: those of each object's front, and those of each one's back.
+    #[must_use]
+    pub fn moved(&self) -> &[Range<u32>] {
+        &self.moved
     }
 
     /// Finds out which vertices are at the same place, and which objects touch. Positions must be those at rest.
@@ -217,17 +229,25 @@ impl Placement {
         let anchor = self.anchor(scene);
         let is_new_anchor = anchor != Anchor::of(world);
         anchor.set(world);
-        let mut change = GeometryChange::None;
+        for part in &mut self.parts {
+            part.has_moved = false;
+        }
         for (part, object) in self.parts.iter_mut().zip(&scene.objects) {
             if is_new_anchor || part.place != object.author_from_mesh {
                 part.place = object.author_from_mesh;
                 part.put(exec, world, &object.mesh);
-                change = GeometryChange::Moved;
+                part.has_moved = true;
             }
         }
+        self.moved.clear();
+        let moved = sides_in_order(&self.parts).filter(|(part, _)| part.has_moved);
+        self.moved.extend(moved.map(|(_, side)| side));
         let radii = self.parts.iter().map(|part| part.radius);
         world.radius = radii.fold(0.0, f64::max);
-        change
+        match self.parts.iter().any(|part| part.has_moved) {
+            true => GeometryChange::Moved,
+            false => GeometryChange::None,
+        }
     }
 
     /// Origin and scale for where the scene's objects are now.
@@ -250,6 +270,16 @@ impl Placement {
             part.set_material(world, material(scene, object).0);
         }
     }
+}
+
+/// The triangles of all fronts, then of all backs, in order, with the part that each belongs to.
+fn sides_in_order(parts: &[Part]) -> impl Iterator<Item = (&Part, Range<u32>)> {
+    let fronts = parts.iter().map(|part| (part, &part.front));
+    let backs = (parts.iter()).filter_map(|part| Some((part, part.back.as_ref()?)));
+    fronts.chain(backs).map(|(part, side)| {
+        let [start, end] = [side.triangles.start, side.triangles.end].map(|t| t as u32);
+        (part, start..end)
+    })
 }
 
 /// An object's material and its index: the last there is if that does not exist, and without any the default one.

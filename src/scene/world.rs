@@ -35,6 +35,9 @@ pub struct World {
     pub triangles: Vec<[u32; 3]>,
     /// Those of the triangles that are backs; the last ones.
     pub backs: Range<u32>,
+    /// First triangle of the front of each object, then those of the backs there are, ascending. Nothing but a hint at which
+    /// triangles move together.
+    pub object_starts: Vec<u32>,
     /// Material index of each triangle.
     pub triangle_material: Vec<u16>,
     /// Runs of neighbouring triangles, in order; together they are all triangles.
@@ -162,17 +165,24 @@ impl World {
         self.materials.extend(shading);
     }
 
-    /// Copies as many lights as there may be.
-    pub(super) fn set_lights(&mut self, lights: &[Light]) {
+    /// Copies as many lights as there may be. Returns whether they are others than before.
+    pub(super) fn set_lights(&mut self, lights: &[Light]) -> bool {
         let mut list = std::mem::take(&mut self.lights);
-        list.clear();
-        list.extend(
-            lights
-                .iter()
-                .take(MAX_LIGHTS)
-                .map(|light| self.light(light)),
-        );
+        let count = lights.len().min(MAX_LIGHTS);
+        let mut are_others = count != list.len();
+        list.truncate(count);
+        for (index, light) in lights[..count].iter().enumerate() {
+            let light = self.light(light);
+            match list.get_mut(index) {
+                Some(known) => {
+                    are_others |= *known != light;
+                    *known = light;
+                }
+                None => list.push(light),
+            }
+        }
         self.lights = list;
+        are_others
     }
 
     /// Copies the background's colour.

@@ -12,7 +12,8 @@
 //! | `repaint` | tiles | colours of parts of triangles |
 //! | `present` | bands of tiles | copies changed tiles to a frame |
 //!
-//! All but the last two can be stopped after any piece of their work, and go on from there (`stages`, `drawing`).
+//! All but the last two can be stopped after any piece of their work, and go on from there (`stages`, `drawing`). Where only some
+//! objects have moved, those that find visibility and colours do so for what these touch (`moved`).
 //!
 //! No pass's result depends on the number of threads, nor coverage, depth and ids on the SIMD level. All memory is kept from
 //! image to image.
@@ -24,6 +25,7 @@ mod edges;
 mod fill;
 mod judge;
 mod lanes;
+mod moved;
 mod outline;
 mod patch;
 mod pixel_batch;
@@ -49,11 +51,13 @@ use super::{
 use crate::output::{Rect, Stamp, Target};
 use crate::parallel::{Exec, Turn, Watch};
 use drawing::{Drawing, Spare};
+use moved::{Origin, PaintKind};
 use repaint::Job;
 use resolve::Painter;
 use shares::Shares;
 use stages::Stage;
 use std::fmt;
+use std::ops::Range;
 use tile::{Grid, TILE_SIDE, Tile};
 
 // Its squares are our tiles.
@@ -72,11 +76,18 @@ pub struct SoftwareBackend {
     tiles: Vec<Tile>,
     /// What comes next for the image.
     stage: Stage,
+    /// What the image is made of.
+    origin: Option<Origin>,
+    /// Covered tiles that it has kept from the image before.
+    kept_tiles: u64,
     /// How far the drawing of each tile is.
     drawings: Vec<Drawing>,
     spare: Spare,
-    /// For each tile the block that gets its colours next, or [`TILE_BLOCKS`](tile::TILE_BLOCKS) if all have them.
+    /// For each tile the block that gets its colours next, or [`TILE_BLOCKS`](tile::TILE_BLOCKS) if all have them and nothing has
+    /// been painted over them.
     resolved: Vec<u16>,
+    /// Where those colours come from.
+    painted: Option<PaintKind>,
     shares: Shares,
     vertices: Vertices,
     visible: Visible,
@@ -119,9 +130,12 @@ impl SoftwareBackend {
             grid: Grid::default(),
             tiles: Vec::new(),
             stage: Stage::default(),
+            origin: None,
+            kept_tiles: 0,
             drawings: Vec::new(),
             spare: Spare::default(),
             resolved: Vec::new(),
+            painted: None,
             shares: Shares::default(),
             vertices: Vertices::default(),
             visible: Visible::default(),
@@ -192,6 +206,21 @@ impl Backend for SoftwareBackend {
         is_complete.then(|| self.counts())
     }
 
+    fn rasterize_moved(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        moved: &[Range<u32>],
+        turn: Turn<'_>,
+    ) -> Option<RasterCounts> {
+        let begins = turn.is_first && !self.begin_moved(geometry, moved);
+        let turn = Turn {
+            is_first: begins,
+            ..turn
+        };
+        self.rasterize_while(exec, geometry, turn)
+    }
+
     fn visible_triangles(&self) -> &[u32] {
         &self.visible.ids
     }
@@ -212,7 +241,20 @@ impl Backend for SoftwareBackend {
         turn: Turn<'_>,
     ) -> bool {
         if turn.is_first {
-            self.resolved.fill(0);
+            self.begin_colours(PaintKind::of(paint), false);
+        }
+        self.colour_tiles(exec, geometry, paint, &Watch::new(turn.go_on))
+    }
+
+    fn resolve_moved(
+        &mut self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        paint: BasePaint<'_>,
+        turn: Turn<'_>,
+    ) -> bool {
+        if turn.is_first {
+            self.begin_colours(PaintKind::of(paint), true);
         }
         self.colour_tiles(exec, geometry, paint, &Watch::new(turn.go_on))
     }
@@ -239,6 +281,9 @@ impl Backend for SoftwareBackend {
         }
         for job in &self.jobs {
             patches[job.patch as usize].pixels += job.pixels;
+            if job.pixels > 0 {
+                self.resolved[job.tile as usize] = 0;
+            }
         }
     }
 
@@ -256,6 +301,11 @@ impl Backend for SoftwareBackend {
             serial: self.serial,
         };
         squares::shade(exec, &mut self.tiles, &painter, squares);
+        for &square in squares {
+            if let Some(next) = self.resolved.get_mut(square as usize) {
+                *next = 0;
+            }
+        }
     }
 
     fn pending_pixels(&self, target: &Target<'_>) -> u64 {

@@ -32,7 +32,7 @@ pub(super) const FIRST_JOBS: usize = 4096;
 /// A patch in a tile.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Job {
-    tile: u32,
+    pub tile: u32,
     /// Index of the patch.
     pub patch: u32,
     /// Slot of the patch's triangle.

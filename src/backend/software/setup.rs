@@ -118,7 +118,7 @@ impl Setup<'_> {
         let mut pending = Pending::new();
         let mut pace = Pace::new(watch, SET_UP_AT_ONCE);
         let mut goes_on = true;
-        while goes_on && let Some(ids) = share.rest.take(self.geometry, pace.left()) {
+        while goes_on && let Some(ids) = share.take(pace.left()) {
             let (first, count) = (ids.start, ids.len());
             let triangles = &self.geometry.world.triangles[ids];
             for (index, triangles) in triangles.chunks(BATCH).enumerate() {

@@ -1,7 +1,8 @@
-//! The visible triangles cut into shares of equal size, the tasks of the passes over triangles.
+//! The world's triangles cut into shares, the tasks of the passes over triangles.
 //!
-//! How they are cut depends on the number of triangles alone, never on the number of threads; and every consumer goes
-//! through the shares in order. So the order of triangles in a tile is always ascending.
+//! How they are cut depends on the world alone, neither on the view nor on the number of threads; and every consumer goes
+//! through the shares in order. So the order of triangles in a tile is always ascending. And an image in which only some objects have
+//! moved can keep the shares of all others, with what set-up has made of them; see [`moved`](super::moved).
 //!
 //! A triangle that is drawn gets a **slot**, a number that says where its share keeps what is known about it: the share in the
 //! upper bits, the place in the lower ones. Slots ascend with ids. Pixels hold slots, because the world's number of a triangle
@@ -13,15 +14,12 @@ use super::triangles::{self, Triangles};
 use crate::backend::{Geometry, RasterCounts};
 use crate::geometry::screen::DepthPlane;
 use crate::parallel::Watch;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Fewest triangles of a share, but for the last: enough work to be worth a task.
-const SMALLEST_SHARE: u64 = 1024;
-/// Most shares: each costs every tile a look into its bins.
-const MOST_SHARES: u64 = 64;
-
-/// Bits of a slot that hold the place: with at most 64 shares of less than `2^32` triangles, no share has more.
-const PLACE_BITS: u32 = 26;
+/// Bits of a slot that hold the place. Shares this large are as many as the other bits can tell apart, if a world has all the
+/// triangles that 32 bits can number.
+const PLACE_BITS: u32 = 24;
 
 /// Set in a triangle's count of pixels if several tiles may add to it.
 const IN_SEVERAL_TILES: u32 = 1 << 31;
@@ -43,15 +41,19 @@ pub(super) enum Progress {
 /// Drawn triangles that are asked whether they own pixels in one go.
 const LISTED_AT_ONCE: usize = 2048;
 
-/// Some consecutive visible triangles, and what set-up makes of them.
+/// Some consecutive triangles of the world, and what set-up makes of those that are visible.
 #[derive(Debug, Default)]
 pub(super) struct Share {
     /// Its number.
     index: u32,
     /// Its triangles.
-    all: Triangles,
-    /// Those of them that the current pass has not yet come to.
-    pub rest: Triangles,
+    all: Range<u32>,
+    /// Those of them that are visible.
+    triangles: Triangles,
+    /// Whether this image sets it up anew. Otherwise all is as in the image before, but for counts of pixels.
+    pub is_new: bool,
+    /// Whether counts of pixels may be others than in the image before.
+    pub is_counted: bool,
     /// How far set-up is.
     pub progress: Progress,
     /// How many of `drawn` have been asked whether they own pixels.
@@ -76,6 +78,7 @@ impl Share {
     fn with_room(index: usize, triangles: usize) -> Self {
         Self {
             index: index as u32,
+            triangles: Triangles::with_room(triangles),
             drawn: Vec::with_capacity(triangles),
             pixels: Vec::with_capacity(triangles),
             visible: Vec::with_capacity(triangles),
@@ -84,19 +87,20 @@ impl Share {
         }
     }
 
-    /// Begins a pass over its triangles.
-    pub(super) fn rewind(&mut self) {
-        self.rest = self.all;
-    }
-
     /// Begins its set-up: forgets what the last image made of its triangles.
     pub(super) fn begin_set_up(&mut self) {
-        self.rewind();
+        self.triangles.rewind();
         self.progress = Progress::Triangles;
         self.drawn.clear();
         self.pixels.clear();
         self.pieces.clear();
         self.counts = RasterCounts::default();
+    }
+
+    /// Takes the next visible triangles that the current pass has not yet come to, at most `most`; `None` when it has come to all.
+    #[inline]
+    pub(super) fn take(&mut self, most: usize) -> Option<Range<usize>> {
+        self.triangles.take(most)
     }
 
     /// Puts a triangle at the next place, and returns its slot.
@@ -195,7 +199,18 @@ pub(super) fn add_pixels(shares: &[Share], slot: u32, pixels: u32) {
     }
 }
 
-/// The shares of an image. Views of fewer triangles leave some unused, which keep their memory for the views to come.
+/// Takes pixels of the image before off the number of those of a triangle; nothing if its share is new, since then counting
+/// has begun at zero.
+#[inline(always)]
+pub(super) fn subtract_pixels(shares: &[Share], slot: u32, pixels: u32) {
+    let share = &shares[(slot >> PLACE_BITS) as usize];
+    if !share.is_new {
+        // The tile has added as many before, so the count has them and stays clear of its mark.
+        share.pixels[place(slot)].fetch_sub(pixels, Ordering::Relaxed);
+    }
+}
+
+/// The shares of a world. Smaller worlds leave some unused, which keep their memory.
 #[derive(Debug, Default)]
 pub(super) struct Shares {
     all: Vec<Share>,
@@ -203,21 +218,39 @@ pub(super) struct Shares {
 }
 
 impl Shares {
-    /// Cuts the visible triangles into shares.
+    /// Cuts the world's triangles into shares, all of which are new.
     pub(super) fn cut(&mut self, geometry: Geometry<'_>) {
-        let total = triangles::total(geometry);
-        let size = share_size(total);
-        self.used = total.div_ceil(size) as usize;
-        if self.all.len() < self.used {
-            // As many as any view's triangles may take, clipping aside, so that the next view does not need more.
-            let room = share_size(geometry.world.triangles.len() as u64) as usize;
-            for index in self.all.len()..self.used {
-                self.all.push(Share::with_room(index, room));
+        let Self { all, used } = self;
+        *used = 0;
+        triangles::cut(geometry.world, 1 << PLACE_BITS, |triangles| {
+            if all.len() == *used {
+                all.push(Share::with_room(*used, triangles.len()));
             }
-        }
-        for (share, all) in self.all.iter_mut().zip(triangles::cut(geometry, size)) {
-            share.all = all;
-            share.rewind();
+            all[*used].all = triangles;
+            *used += 1;
+        });
+        self.update(geometry, |_| true);
+    }
+
+    /// Keeps the shares of the image before that hold none of the triangles in `moved`, which ascend, and of which the same
+    /// triangles are visible. All others are new.
+    pub(super) fn keep_unmoved(&mut self, geometry: Geometry<'_>, moved: &[Range<u32>]) {
+        self.update(geometry, |share| {
+            let next = moved.partition_point(|range| range.end <= share.start);
+            moved.get(next).is_some_and(|range| range.start < share.end)
+        });
+    }
+
+    /// Tells the shares which triangles are visible.
+    fn update(&mut self, geometry: Geometry<'_>, has_moved: impl Fn(&Range<u32>) -> bool) {
+        let mut first = 0;
+        for share in self.used_mut() {
+            let visible = triangles::clipped(geometry.visible, &mut first, &share.all);
+            share.is_new = has_moved(&share.all) || !share.triangles.are(visible.clone());
+            share.is_counted = share.is_new;
+            if share.is_new {
+                share.triangles.set(visible);
+            }
         }
     }
 
@@ -275,30 +308,33 @@ impl Shares {
     }
 }
 
-/// How many triangles a share holds, but for the last, when there are `total`.
-fn share_size(total: u64) -> u64 {
-    SMALLEST_SHARE.max(total.div_ceil(MOST_SHARES))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Eye, View, World};
     use glam::DMat4;
 
+    fn scene(triangles: usize) -> (World, View) {
+        let world = World {
+            triangles: vec![[0; 3]; triangles],
+            // Of 1000 triangles each, so that shares are.
+            object_starts: (0..triangles as u32).step_by(1000).collect(),
+            ..World::default()
+        };
+        let view = View {
+            width: 1,
+            height: 1,
+            pixel_from_world: DMat4::IDENTITY,
+            eye: Eye::Point([0.0; 3]),
+            encoding: Default::default(),
+        };
+        (world, view)
+    }
+
     #[test]
     #[expect(clippy::reversed_empty_ranges, reason = "such a range holds nothing")]
     fn shares_hold_every_visible_triangle_once_and_in_order() {
-        let (world, view) = (
-            World::default(),
-            View {
-                width: 1,
-                height: 1,
-                pixel_from_world: DMat4::IDENTITY,
-                eye: Eye::Point([0.0; 3]),
-                encoding: Default::default(),
-            },
-        );
+        let (world, view) = scene(200_000);
         // One after the other in the same memory.
         let mut shares = Shares::default();
         let many = (0..5000).map(|i| i * 10..i * 10 + i % 4).collect();
@@ -317,10 +353,9 @@ mod tests {
                 visible: &visible,
             };
             shares.cut(geometry);
-            assert!(shares.used().len() as u64 <= MOST_SHARES);
             let mut got = Vec::new();
             for share in shares.used_mut() {
-                while let Some(ids) = share.rest.take(geometry, 300) {
+                while let Some(ids) = share.take(300) {
                     assert!((1..=300).contains(&ids.len()), "{ids:?}");
                     got.extend(ids);
                 }
@@ -333,5 +368,35 @@ mod tests {
                 .collect();
             assert_eq!(got, want);
         }
+    }
+
+    #[test]
+    fn shares_are_kept_unless_something_in_them_moves_appears_or_vanishes() {
+        let (world, view) = scene(10_000);
+        let mut shares = Shares::default();
+        let mut new = |visible: &[Range<u32>], moved: Option<&[Range<u32>]>| {
+            let geometry = Geometry {
+                world: &world,
+                view: &view,
+                visible,
+            };
+            match moved {
+                None => shares.cut(geometry),
+                Some(moved) => shares.keep_unmoved(geometry, moved),
+            }
+            let new = shares.used().iter().filter(|share| share.is_new);
+            new.map(|share| share.all.start / 1000).collect::<Vec<_>>()
+        };
+        let all: [Range<u32>; 2] = [0..1500, 2500..10_000];
+        assert_eq!(new(&all, None).len(), 10);
+        assert!(new(&all, Some(&[])).is_empty());
+        // Whether it is visible or not.
+        let (first, hidden, both) = (0..1, 1600..1700, 3999..4001);
+        assert_eq!(new(&all, Some(&[first, hidden, both])), [0, 1, 3, 4]);
+        // The same triangles in other ranges.
+        let split = [0..1000, 1000..1500, 2500..4000, 4000..10_000];
+        assert!(new(&split, Some(&[])).is_empty());
+        assert_eq!(new(&[0..1500, 2501..9999], Some(&[])), [2, 9]);
+        assert_eq!(new(&all, Some(&[])), [2, 9]);
     }
 }

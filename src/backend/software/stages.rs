@@ -6,6 +6,7 @@
 
 use super::SoftwareBackend;
 use super::drawing::{Desk, Drawing};
+use super::moved::Origin;
 use super::raster;
 use super::resolve::{self, Painter};
 use super::setup;
@@ -47,6 +48,7 @@ impl SoftwareBackend {
             self.tiles.clear();
             self.grid = grid;
         }
+        self.origin = Some(Origin::of(geometry));
         self.stage = Stage::Fit;
     }
 
@@ -120,7 +122,9 @@ impl SoftwareBackend {
 
     fn begin_set_up(&mut self) {
         for share in self.shares.used_mut() {
-            share.begin_set_up();
+            if share.is_new {
+                share.begin_set_up();
+            }
         }
         self.stage = Stage::SetUp;
     }
@@ -142,13 +146,18 @@ impl SoftwareBackend {
         shares.all(|share| share.progress == Progress::Done)
     }
 
-    /// Forgets how far drawing came.
+    /// Forgets how far drawing came, unless there is something to keep.
     fn begin_drawing(&mut self, exec: Exec) {
-        for drawing in &mut self.drawings {
-            if let Drawing::Unfinished(block) = std::mem::take(drawing) {
-                self.spare.put_back(block);
+        if self.shares.used().iter().all(|share| share.is_new) {
+            for drawing in &mut self.drawings {
+                if let Drawing::Unfinished(block) = std::mem::take(drawing) {
+                    self.spare.put_back(block);
+                }
             }
+        } else {
+            self.mark_new();
         }
+        self.note_changes();
         self.spare.provide(exec.threads);
         self.stage = Stage::Draw;
     }
@@ -247,6 +256,7 @@ impl SoftwareBackend {
             counts.covered_pixels += u64::from(tile.covered);
             counts.background_tiles += u64::from(tile.covered == 0);
         }
+        counts.kept_tiles = self.kept_tiles;
         counts
     }
 }

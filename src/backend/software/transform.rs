@@ -70,10 +70,9 @@ impl Vertices {
         watch: &Watch<'_>,
     ) {
         exec.for_each_chunk(shares, 1, |_, share| {
-            let rest = &mut share[0].rest;
             let mut pace = Pace::new(watch, MARKED_AT_ONCE);
             let mut goes_on = !watch.is_over();
-            while goes_on && let Some(ids) = rest.take(geometry, pace.left()) {
+            while goes_on && let Some(ids) = share[0].take(pace.left()) {
                 goes_on = pace.did(ids.len());
                 for &vertex in geometry.world.triangles[ids].as_flattened() {
                     let flag = &self.wanted[vertex as usize / BLOCK];

@@ -1,67 +1,163 @@
-//! Consecutive visible triangles, which are taken away piece by piece.
+//! Which triangles a share of the world's has, and which of them are visible.
 
-use crate::backend::Geometry;
+use crate::scene::World;
 use std::ops::Range;
 
-/// Some consecutive visible triangles.
-#[derive(Clone, Copy, Debug, Default)]
+/// Fewest triangles of a share, but for the last and for small objects: enough work to be worth a task.
+const SMALLEST_SHARE: u32 = 1024;
+/// About how many shares there are: each costs every tile a look into its bins.
+const ABOUT_SO_MANY_SHARES: u32 = 64;
+
+/// Some visible triangles, as ranges, which are gone through piece by piece.
+#[derive(Debug, Default)]
 pub(super) struct Triangles {
-    /// The range in `Geometry::visible` that holds the first triangle.
+    /// Ascending; none is empty.
+    ranges: Vec<Range<u32>>,
+    /// The range that holds the next triangle.
     range: usize,
     /// Triangles of that range that come before it.
-    skip: u64,
-    /// Number of triangles.
-    count: u64,
+    skip: u32,
 }
 
 impl Triangles {
-    /// Takes away the first of them, at most `most`, and returns their ids; `None` when there are none.
-    #[inline]
-    pub(super) fn take(&mut self, geometry: Geometry<'_>, most: usize) -> Option<Range<usize>> {
-        while self.count > 0 {
-            let range = geometry.visible.get(self.range)?;
-            let available = length(range).saturating_sub(self.skip);
-            if available == 0 {
-                self.range += 1;
-                self.skip = 0;
-                continue;
-            }
-            let taken = available.min(self.count).min(most as u64);
-            let start = u64::from(range.start) + self.skip;
-            self.skip += taken;
-            self.count -= taken;
-            return Some(start as usize..(start + taken) as usize);
+    /// None, with room for those of a share of so many: every second triangle at worst, every second cluster as a rule.
+    pub(super) fn with_room(triangles: usize) -> Self {
+        Self {
+            ranges: Vec::with_capacity(triangles / 32 + 1),
+            ..Self::default()
         }
-        None
+    }
+
+    /// Whether they are those of these ranges.
+    pub(super) fn are(&self, ranges: impl Iterator<Item = Range<u32>>) -> bool {
+        self.ranges.iter().cloned().eq(ranges)
+    }
+
+    /// Replaces them by those of some ranges, of which none is empty.
+    pub(super) fn set(&mut self, ranges: impl Iterator<Item = Range<u32>>) {
+        self.ranges.clear();
+        self.ranges.extend(ranges);
+        self.rewind();
+    }
+
+    /// Begins again with the first.
+    pub(super) fn rewind(&mut self) {
+        (self.range, self.skip) = (0, 0);
+    }
+
+    /// Goes past the next ones, at most `most`, and returns their ids; `None` when there are none.
+    #[inline]
+    pub(super) fn take(&mut self, most: usize) -> Option<Range<usize>> {
+        let range = self.ranges.get(self.range)?;
+        let start = range.start + self.skip;
+        let taken = (range.end - start).min(u32::try_from(most).unwrap_or(u32::MAX));
+        self.skip += taken;
+        if start + taken == range.end {
+            (self.range, self.skip) = (self.range + 1, 0);
+        }
+        Some(start as usize..(start + taken) as usize)
     }
 }
 
-/// The visible triangles cut into runs of `size`, the last of which may be shorter.
-pub(super) fn cut(geometry: Geometry<'_>, size: u64) -> impl Iterator<Item = Triangles> {
-    let (mut range, mut skip, mut left) = (0, 0, total(geometry));
-    std::iter::from_fn(move || {
-        let count = size.min(left);
-        let run = Triangles { range, skip, count };
-        left -= count;
-        let mut taken = count;
-        while let Some(available) = geometry.visible.get(range).map(|r| length(r) - skip)
-            && available <= taken
-        {
-            taken -= available;
-            skip = 0;
-            range += 1;
+/// Those of some ascending ranges that lie in `within`, cut off where it ends. `first` is a range before which none does, and is moved
+/// on; so each of several ascending `within` goes on where the one before ended.
+pub(super) fn clipped<'a>(
+    ranges: &'a [Range<u32>],
+    first: &mut usize,
+    within: &Range<u32>,
+) -> impl Iterator<Item = Range<u32>> + Clone + use<'a> {
+    let (start, end) = (within.start, within.end);
+    let before = ranges[*first..].iter().take_while(|r| r.end <= start);
+    *first += before.count();
+    (ranges[*first..].iter())
+        .take_while(move |range| range.start < end)
+        .map(move |range| range.start.max(start)..range.end.min(end))
+        .filter(|range| !range.is_empty())
+}
+
+/// Cuts a world's triangles into shares of at most `largest`, and calls `found` with each.
+///
+/// Shares end where objects do, as far as that leaves them large enough: what has moved are whole objects.
+pub(super) fn cut(world: &World, largest: u32, mut found: impl FnMut(Range<u32>)) {
+    let total = world.triangles.len() as u32;
+    let size = SMALLEST_SHARE
+        .max(total.div_ceil(ABOUT_SO_MANY_SHARES))
+        .min(largest);
+    // In a world that large there is no room for more shares than need be.
+    let starts: &[u32] = if size < largest {
+        &world.object_starts
+    } else {
+        &[]
+    };
+    let ends = (starts.iter().copied().filter(|&end| end < total)).chain([total]);
+    let (mut start, mut object) = (0, 0);
+    for end in ends {
+        if end - start > size && object > start {
+            found(start..object);
+            start = object;
         }
-        skip += taken;
-        (count > 0).then_some(run)
-    })
+        let count = (end - start).div_ceil(size);
+        if count > 1 {
+            let equal = (end - start).div_ceil(count);
+            while end - start > equal {
+                found(start..start + equal);
+                start += equal;
+            }
+        }
+        object = end;
+    }
+    if start < total {
+        found(start..total);
+    }
 }
 
-/// How many triangles are visible.
-pub(super) fn total(geometry: Geometry<'_>) -> u64 {
-    geometry.visible.iter().map(length).sum()
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Number of triangles in a range.
-fn length(range: &Range<u32>) -> u64 {
-    u64::from(range.end.saturating_sub(range.start))
+    fn shares(triangles: u32, object_starts: Vec<u32>, largest: u32) -> Vec<Range<u32>> {
+        let world = World {
+            triangles: vec![[0; 3]; triangles as usize],
+            object_starts,
+            ..World::default()
+        };
+        let mut shares = Vec::new();
+        cut(&world, largest, |share| shares.push(share));
+        shares
+    }
+
+    #[test]
+    fn shares_are_all_triangles_in_order_and_not_too_many() {
+        for (triangles, starts) in [
+            (0, vec![]),
+            (1, vec![]),
+            (1024, vec![0]),
+            (200_000, vec![]),
+            (57_344, (0..10).map(|i| i * 5734).collect()),
+            (200_000, (0..100_000).map(|i| 2 * i).collect()),
+            (200_000, vec![0, 5, 100_000, 100_000, 100_007, 200_000]),
+        ] {
+            for largest in [1 << 24, 700] {
+                let shares = shares(triangles, starts.clone(), largest);
+                let size = (triangles.div_ceil(64)).max(1024).min(largest);
+                let mut next = 0;
+                for share in &shares {
+                    assert_eq!(share.start, next);
+                    assert!((1..=size).contains(&(share.end - share.start)), "{share:?}");
+                    next = share.end;
+                }
+                assert_eq!(next, triangles);
+                assert!(shares.len() as u32 <= 2 * triangles.div_ceil(size) + 1);
+            }
+        }
+    }
+
+    #[test]
+    fn objects_of_some_size_have_shares_of_their_own() {
+        let starts: Vec<u32> = (0..10).map(|i| i * 6000).collect();
+        let shares = shares(60_000, starts.clone(), 1 << 24);
+        for start in starts {
+            assert!(shares.iter().any(|share| share.start == start), "{start}");
+        }
+    }
 }

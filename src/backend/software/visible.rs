@@ -30,9 +30,13 @@ impl Visible {
         })
     }
 
-    /// Begins the list.
+    /// Begins the list. Shares whose counts of pixels are those of the image before keep theirs.
     pub(super) fn begin(&mut self, shares: &mut Shares) {
-        for share in shares.used_mut() {
+        for share in shares
+            .used_mut()
+            .iter_mut()
+            .filter(|share| share.is_counted)
+        {
             share.begin_list();
         }
         self.ids.clear();

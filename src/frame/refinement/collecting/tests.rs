@@ -66,7 +66,7 @@ impl Image {
         image.base.cull(&mut Culler::new(&world.clusters), view);
         image
             .base
-            .rasterize(exec, world, view, &mut image.backend, Turn::WHOLE);
+            .rasterize(exec, world, view, &mut image.backend, None, Turn::WHOLE);
         image.base.shade(
             exec,
             Method::Adaptive,
