@@ -365,7 +365,11 @@ impl Picture {
             easel.book(kind, load, now - since);
             since = now;
             if !is_done {
-                if has_frame_to_itself && allowance.nominal_ns() == 0 && !refinement.is_finished() {
+                let is_finished = match easel.method {
+                    Method::PhongTiles => self.tiles.is_finished(),
+                    _ => refinement.is_finished(),
+                };
+                if has_frame_to_itself && allowance.nominal_ns() == 0 && !is_finished {
                     easel.costs.doubt(kind);
                 }
                 break;
