@@ -22,7 +22,7 @@ use crate::clock::Clock;
 /// Nothing is silently left out of the picture, and the outcome says which case it was. Four things are not interrupted: placing objects that have moved,
 /// making ready for a replaced scene or another image size, colouring a first image and handing an image over. The last two are
 /// predicted, and not begun when they would not end in time. A budget less than handing over takes cannot be
-/// kept; the frame is as little late as can be. Backends other than the software one draw a first image as a
+/// kept; the frame is as little late as can be, and draws a piece of the image all the same. Backends other than the software one draw a first image as a
 /// whole, late if need be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
@@ -146,11 +146,17 @@ impl<'a> Allowance<'a> {
     }
 
     /// Whether a first image may be begun, or gone on with: notes that it is.
+    ///
+    /// The first one of a frame may be even if time is up, unless the token says otherwise. What cannot be interrupted may take all of
+    /// every frame's time, and yet a piece of the image is drawn in each, so that it comes about.
     #[must_use]
     pub fn begins_image(&mut self) -> bool {
         let may_begin = match self.budget {
             Budget::Replay(record) => record.images > self.done.images || record.is_image_begun,
-            _ => self.goes_on(),
+            _ => {
+                let is_first = self.done.images == 0 && !self.done.is_image_begun;
+                self.goes_on() || is_first && !self.cancel.is_cancelled()
+            }
         };
         self.done.is_image_begun |= may_begin;
         may_begin
@@ -354,6 +360,19 @@ mod tests {
         clock.advance_ms(0.5);
         assert!(!allowance.admit_free(500_001));
         assert!(!allowance.admit(0), "the first refusal is the last word");
+    }
+
+    #[test]
+    fn a_frame_that_is_late_already_begins_one_image_unless_it_is_cancelled() {
+        let (clock, cancel) = (ManualClock::default(), CancelToken::new());
+        let mut allowance = start(Budget::from_millis(1.0), &clock, &cancel);
+        clock.advance_ms(2.0);
+        assert!(!allowance.goes_on() && allowance.begins_image() && !allowance.begins_image());
+        allowance.note_image();
+        assert!(!allowance.begins_image());
+        allowance = start(Budget::from_millis(1.0), &clock, &cancel);
+        cancel.cancel();
+        assert!(!allowance.begins_image());
     }
 
     #[test]

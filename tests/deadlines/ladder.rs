@@ -280,6 +280,39 @@ fn an_image_that_is_old_or_not_there_is_not_final() {
     }
 }
 
+/// Looking at the clock takes longer than there is time, as placing objects may.
+#[test]
+fn images_come_about_even_if_every_frame_is_late_from_the_start() {
+    let scene = mixed();
+    for method in [Method::Gouraud, Method::Phong, Method::Adaptive] {
+        for (us, budget_ms) in [(500.0, 0.8), (1000.0, 0.5), (3000.0, 0.001)] {
+            for is_moving in [false, true] {
+                let clock = CountingClock::stepping(us);
+                let mut engine = engine(&scene, options(method, 1, clock));
+                let mut frame = Frame::new(SIZE[0], SIZE[1]);
+                let mut images = 0;
+                let mut now = scene.clone();
+                for step in 0..600 {
+                    if is_moving {
+                        let place =
+                            DMat4::from_translation((1.0, -4.0, 0.01 * f64::from(step)).into());
+                        now.set_transform(1, place);
+                    }
+                    images += engine
+                        .render(&now, Budget::Millis(budget_ms), &mut frame)
+                        .record
+                        .images;
+                }
+                let least = if is_moving { 2 } else { 1 };
+                assert!(
+                    images >= least,
+                    "{method}, {us} us a reading, moving: {is_moving}: {images} images"
+                );
+            }
+        }
+    }
+}
+
 /// Along an axis the view's matrix has zeros of both signs.
 #[test]
 fn a_camera_along_an_axis_has_a_view_like_any_other() {

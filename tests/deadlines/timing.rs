@@ -5,10 +5,11 @@ use specula::clock::Clock;
 use specula::frame::Outcome;
 use specula::{Budget, Frame, Method};
 
-/// Readings after the last one that admits work, at most. The longest way from there: an image may be begun, its clusters are culled
-/// (two readings, not interrupted), going on is refused (one), the background or the image before is handed over (two), and the
-/// frame is reported (one). Each further thread asks once more.
-const MOST_READINGS: u64 = 6;
+/// Readings after the last one before the deadline, at most. The longest way from there: placing objects ends (one reading), beginning an
+/// image is refused (one) and, since nothing has been drawn yet, done all the same; its clusters are culled (two), going on is refused
+/// (one), the background or the image before is handed over (two), and the frame is reported (one). Each further thread asks
+/// once more.
+const MOST_READINGS: u64 = 8;
 
 const METHODS: [Method; 4] = [
     Method::Adaptive,
