@@ -54,7 +54,7 @@ fn every_pixel_that_differs_lies_in_one_rectangle() {
     for (method, us) in [
         (Method::Adaptive, 2.0),
         (Method::Adaptive, 60.0),
-        (Method::PhongTiles, 20.0),
+        (Method::PhongTiles, 12.0),
     ] {
         let clock = CountingClock::stepping(us);
         let mut engine = engine(&scene, options(method, 1, clock));
@@ -66,6 +66,7 @@ fn every_pixel_that_differs_lies_in_one_rectangle() {
                 let scene = turned(&scene, number / 15);
                 let budget = match number % 15 {
                     3 => first_image_at(2),
+                    5 => Budget::Work(40_000),
                     12.. => Budget::Unlimited,
                     _ => Budget::Millis(0.6),
                 };
