@@ -15,16 +15,19 @@
 //! Colours of the image before stay until `Colouring` begins, so it can be handed over until then. Where it is the image shown, colouring is
 //! not interrupted, lest a part of either is shown.
 
+mod refining;
+
+pub(super) use refining::Easel;
+
 use super::Method;
 use super::base::BaseImage;
-use super::load::{self, ImageLoad};
+use super::load::ImageLoad;
 use super::motion::Motion;
 use super::refine_first::RefineFirst;
-use super::refinement::{Refinement, Stage};
+use super::refinement::Refinement;
 use super::stats::{FrameStats, StageTimes};
 use super::tiles::Tiles;
 use crate::backend::Backend;
-use crate::output::Target;
 use crate::parallel::{Exec, GoOn, Turn};
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, CostModel, Kind, Load};
@@ -80,32 +83,6 @@ pub(super) struct Studio<'a> {
     pub(super) stages: &'a mut StageTimes,
     /// What the stages that ended in this frame were predicted to take.
     pub(super) predicted: &'a mut StageTimes,
-}
-
-/// What refining needs besides the picture itself.
-pub(super) struct Easel<'a, 'b> {
-    pub(super) exec: Exec,
-    pub(super) method: Method,
-    pub(super) world: &'a World,
-    pub(super) costs: &'a mut CostModel,
-    pub(super) stages: &'a mut StageTimes,
-    /// What was done in this frame was predicted to take.
-    pub(super) predicted: &'a mut StageTimes,
-    /// Where the image will go; nowhere in spare time.
-    pub(super) target: Option<&'a Target<'b>>,
-}
-
-impl Easel<'_, '_> {
-    /// Books a step of refinement that took `ms` milliseconds.
-    fn book(&mut self, kind: Kind, load: Load, ms: f64) {
-        let (spent, predicted) = match kind {
-            Kind::Collect => (&mut self.stages.classify, &mut self.predicted.classify),
-            _ => (&mut self.stages.refine, &mut self.predicted.refine),
-        };
-        *spent += ms;
-        *predicted += self.costs.predict_ms(kind, load);
-        self.costs.learn(kind, load, ms);
-    }
 }
 
 impl Picture {
@@ -307,88 +284,6 @@ impl Picture {
         self.begin_refinement(studio, allowance, &view);
         self.enter(Pass::Coloured);
         true
-    }
-
-    /// Refines the image while the budget lasts, less what handing it over will take. Returns the milliseconds that
-    /// drawing took, where that comes after refinement and was done.
-    pub(super) fn refine(
-        &mut self,
-        easel: &mut Easel<'_, '_>,
-        allowance: &mut Allowance<'_>,
-    ) -> Option<f64> {
-        let view = *self.view()?;
-        let refines_first = self.refines_first(easel.method);
-        let mut stage = Stage {
-            exec: easel.exec,
-            world: easel.world,
-            view: &view,
-            base: &self.base,
-            backend: &mut *self.backend,
-        };
-        let refinement = &mut self.refinement;
-        if refines_first {
-            let presenting_ms =
-                load::pending_ms(easel.costs, stage.backend, self.divisor, easel.target, true);
-            let since = allowance.elapsed_ms();
-            let drawing_ms =
-                self.refine_first
-                    .frame(refinement, &mut stage, allowance, presenting_ms);
-            let drawing = drawing_ms.unwrap_or(0.0);
-            easel.stages.refine += allowance.elapsed_ms() - since - drawing;
-            easel.stages.resolve += drawing;
-            return drawing_ms;
-        }
-        let mut since = allowance.elapsed_ms();
-        let has_frame_to_itself = allowance.record().images == 0;
-        while !refinement.satisfies(allowance) {
-            let presenting_ms = load::pending_ms(
-                easel.costs,
-                stage.backend,
-                self.divisor,
-                easel.target,
-                false,
-            );
-            allowance.reserve_ms(presenting_ms);
-            let kind = match easel.method {
-                Method::PhongTiles => Kind::Paint,
-                _ => refinement.next_kind(),
-            };
-            let ms_per_unit = easel.costs.predict_at_most_ms(kind, Load::of_items(1.0));
-            allowance.set_ms_per_unit(ms_per_unit);
-            let done_ns = allowance.nominal_ns();
-            let is_done = match easel.method {
-                Method::PhongTiles => self.tiles.step(&mut stage, allowance),
-                _ => refinement.step(&mut stage, allowance),
-            };
-            let load = Load::of_items((allowance.nominal_ns() - done_ns) as f64);
-            let now = allowance.elapsed_ms();
-            easel.book(kind, load, now - since);
-            since = now;
-            if !is_done {
-                let is_finished = match easel.method {
-                    Method::PhongTiles => self.tiles.is_finished(),
-                    _ => refinement.is_finished(),
-                };
-                if has_frame_to_itself && allowance.nominal_ns() == 0 && !is_finished {
-                    easel.costs.doubt(kind);
-                }
-                break;
-            }
-        }
-        None
-    }
-
-    fn begin_refinement(&mut self, studio: &Studio<'_>, allowance: &Allowance<'_>, view: &View) {
-        if studio.method == Method::PhongTiles {
-            self.tiles.begin(view, &*self.backend);
-        }
-        if !studio.method.refines_triangles() {
-            return self.refinement.clear();
-        }
-        self.refinement.set_remembering(allowance.is_timed());
-        let (exec, method, world) = (studio.exec, studio.method, studio.world);
-        self.refinement
-            .begin(exec, method, world, view, &self.base, &*self.backend);
     }
 
     fn cull(&mut self, studio: &mut Studio<'_>, allowance: &Allowance<'_>, view: &View) -> bool {
