@@ -158,6 +158,8 @@ struct Paint {
     patch: Patch,
     owner: Owner,
     units: u32,
+    /// What it takes away from the sum of squared errors, by what is known; see [`error_mass`](Refinement::error_mass).
+    benefit: f64,
 }
 
 /// A leaf's patches that are still to be painted, or its parts still to be shaded, and its pixels counted so far.
@@ -206,8 +208,11 @@ pub(super) struct Refinement {
     pixels: u64,
     /// By leaf.
     progressing: Vec<Progressing>,
-    /// Expected sum of squared errors over the pixels of all roots, per channel, in squared codes.
+    /// Expected sum of squared errors over the pixels of all roots once everything planned has been painted, per channel, in
+    /// squared codes.
     error_mass: f64,
+    /// What is to be added to it as long as what is planned has not been painted: the benefit of all `paints`.
+    benefit_to_paint: f64,
     counters: Counters,
     /// Nominal cost of the bounds found by the candidate being planned.
     units_for_bounds: u64,
@@ -250,6 +255,7 @@ impl Refinement {
         self.pixels_to_draw = 0;
         self.pixels = 0;
         self.error_mass = 0.0;
+        self.benefit_to_paint = 0.0;
         self.counters = Counters::default();
     }
 
@@ -353,7 +359,8 @@ impl Refinement {
         if self.is_collecting() && self.roots.is_empty() {
             return f64::NAN;
         }
-        (self.error_mass.max(0.0) / self.pixels.max(1) as f64).sqrt()
+        let mass = self.error_mass + self.benefit_to_paint;
+        (mass.max(0.0) / self.pixels.max(1) as f64).sqrt()
     }
 
     /// Whether the budget asks for no better image.

@@ -212,7 +212,7 @@ impl Refinement {
                 fill: Fill::Phong { lights, remainder },
                 pixels: 0,
             };
-            self.enqueue(Owner::Nobody, patch, part.pixels);
+            self.enqueue(Owner::Nobody, patch, part.pixels, part.mass());
         }
     }
 }

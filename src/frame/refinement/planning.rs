@@ -212,6 +212,7 @@ impl Refinement {
     }
 
     fn note_split(&mut self, stage: &Stage<'_>, split: &SplitOutcome) {
+        let mass_before = self.error_mass;
         let children = match split {
             SplitOutcome::Rejected { leaf, error } => {
                 self.error_mass -= self.leaf_mass(*leaf);
@@ -231,8 +232,13 @@ impl Refinement {
                 children.clone()
             }
         };
-        for child in children {
+        for child in children.clone() {
             self.error_mass += self.leaf_mass(child);
+        }
+        let pixels = children.clone().map(|child| self.forest.leaf(child).pixels);
+        let pixels = pixels.map(f64::from).sum::<f64>().max(1.0);
+        let benefit_per_pixel = (mass_before - self.error_mass) / pixels;
+        for child in children {
             if self.is_drawn_once {
                 self.offer_leaf(stage, child);
                 continue;
@@ -245,7 +251,8 @@ impl Refinement {
                 pixels: 0,
             };
             let pixels = leaf.pixels as f32;
-            self.enqueue(Owner::Leaf(child), patch, pixels);
+            let benefit = benefit_per_pixel * f64::from(pixels);
+            self.enqueue(Owner::Leaf(child), patch, pixels, benefit);
         }
     }
 
@@ -254,7 +261,7 @@ impl Refinement {
         let root = self.roots[index as usize];
         self.roots[index as usize].progress = Progress::Done;
         self.error_mass -= root.mass();
-        self.shade_patch(stage, index, Bary::ROOT, root.pixels);
+        self.shade_patch(stage, index, Bary::ROOT, root.pixels, root.mass());
         let place = self.roots[index as usize].shading as usize;
         if let Some(shading) = self.shadings.get_mut(place) {
             shading.last_paint = self.enqueued;
@@ -263,17 +270,25 @@ impl Refinement {
 
     /// Has the pixels of a leaf shaded.
     fn shade_leaf(&mut self, stage: &Stage<'_>, id: LeafId) {
-        self.error_mass -= self.leaf_mass(id);
+        let mass = self.leaf_mass(id);
+        self.error_mass -= mass;
         self.forest.close(stage.world, id);
         let leaf = self.forest.leaf(id);
         let (corners, pixels) = (leaf.corners, leaf.pixels);
         if let Some(index) = self.root_of(leaf.triangle) {
-            self.shade_patch(stage, index, corners, pixels);
+            self.shade_patch(stage, index, corners, pixels, mass);
             self.leaf_progress(id).last_paint = self.enqueued;
         }
     }
 
-    fn shade_patch(&mut self, stage: &Stage<'_>, index: u32, corners: [Bary; 3], pixels: u32) {
+    fn shade_patch(
+        &mut self,
+        stage: &Stage<'_>,
+        index: u32,
+        corners: [Bary; 3],
+        pixels: u32,
+        mass: f64,
+    ) {
         let Shading::PerPixel(lights, remainder) = self.shading(stage, index) else {
             return;
         };
@@ -284,7 +299,7 @@ impl Refinement {
             fill: Fill::Phong { lights, remainder },
             pixels: 0,
         };
-        self.enqueue(Owner::Nobody, patch, pixels as f32);
+        self.enqueue(Owner::Nobody, patch, pixels as f32, mass);
     }
 
     /// Which terms the pixels of a root need: by its bounds, if finding those costs less than they may save.
