@@ -111,7 +111,8 @@ impl Root {
 
     /// Its share of the expected sum of squared errors while it has not been looked at.
     fn mass(&self) -> f64 {
-        f64::from(self.pixels) * f64::from(self.prior)
+        let error = (self.prior - ranking::ERROR_FLOOR).max(0.0);
+        f64::from(self.pixels) * f64::from(ranking::rounded_error(error))
     }
 }
 
@@ -388,7 +389,7 @@ impl Refinement {
     /// A leaf's share of the expected sum of squared errors.
     fn leaf_mass(&self, leaf: LeafId) -> f64 {
         let leaf = self.forest.leaf(leaf);
-        f64::from(leaf.pixels) * f64::from(leaf.error)
+        f64::from(leaf.pixels) * f64::from(ranking::rounded_error(leaf.error))
     }
 
     /// The place in `roots` of a visible triangle.

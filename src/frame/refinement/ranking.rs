@@ -23,6 +23,9 @@ pub(super) const ERROR_FLOOR: f32 = 1e-3;
 /// edge midpoints deviates by `4/3 m` there, and its mean square is `16/15 m^2`.
 pub(super) const CENTROID_SHARE: f32 = 0.6;
 
+/// What was left out by [`prior_error`] because centroids show it: see [`unsampled_error`].
+const UNSAMPLED_FACTOR: f32 = 32.0;
+
 /// Points that a new leaf has to itself: three edge midpoints, most of them shared by two leaves.
 const POINTS_PER_LEAF: f32 = 1.5;
 
@@ -53,6 +56,18 @@ pub(super) fn prior_error([a, b, c]: [f32; 3], is_pht: bool) -> f32 {
     let contrast = a.max(b).max(c) - a.min(b).min(c);
     let highlight = if is_pht { 4.0 } else { 0.0 };
     contrast * contrast / 1024.0 + highlight + ERROR_FLOOR
+}
+
+/// Expected squared difference between two codes, in squared codes, when the two colours differ by a mean square of `error` before they
+/// are rounded. Where they hardly differ, they are rounded alike as a rule, and now and then to neighbouring codes: as often
+/// as their difference is large, which for a normal distribution is 0.8 times its root mean square. Else each of both is off by 1/12.
+pub(super) fn rounded_error(error: f32) -> f32 {
+    error + (0.8 * error.sqrt()).min(1.0 / 6.0)
+}
+
+/// The prior error of a triangle of which the centroid is not looked at, because by `prior` alone it hardly matters.
+pub(super) fn unsampled_error(prior: f32) -> f32 {
+    ERROR_FLOOR + UNSAMPLED_FACTOR * (prior - ERROR_FLOOR)
 }
 
 /// Nominal cost of cutting a leaf or part of `pixels` pixels into parts, or of putting it on the list if it is small.
