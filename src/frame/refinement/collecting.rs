@@ -36,7 +36,7 @@ const PIXELS_FOR_CENTROID: u32 = 64;
 
 /// So has a smaller one where the corners let expect such a sum of squared errors. Nine tenths of the error of tiny triangles is in a
 /// fifth of them, which the corners tell from the others; to sample all would cost as much as shading some of them.
-const MASS_FOR_CENTROID: f32 = 0.03;
+const MASS_FOR_CENTROID: f32 = 0.125;
 
 /// About as many triangles have so many pixels as are sampled: by that the cost of collecting is told in advance.
 const PIXELS_AS_A_RULE: u32 = 8;
@@ -239,7 +239,8 @@ impl Collector {
         samples.illuminate(exec, world, view);
         for (sample, index) in sampled().enumerate() {
             let [r, g, b] = samples.deviation(sample);
-            roots[index].prior += ranking::CENTROID_SHARE * (r * r + g * g + b * b) / 3.0;
+            let square = (r * r + g * g + b * b) / 3.0;
+            roots[index].prior += ranking::centroid_error(square, roots[index].is_pht);
         }
     }
 }
