@@ -192,6 +192,8 @@ pub(super) struct Refinement {
     shadings: Vec<RootShading>,
     collectors: Vec<Collector>,
     paints: VecDeque<Paint>,
+    /// Nominal cost of all plans so far, and of painting what they ask for.
+    planned_units: u64,
     /// How many patches were put on the list so far, which numbers them from 1.
     enqueued: u32,
     parts: Vec<Part>,
@@ -248,6 +250,7 @@ impl Refinement {
         self.shadings.clear();
         self.paints.clear();
         self.enqueued = 0;
+        self.planned_units = 0;
         self.progressing.clear();
         self.parts.clear();
         self.samples.clear();

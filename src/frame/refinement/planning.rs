@@ -2,15 +2,23 @@
 
 use super::parts;
 use super::ranking::{self, Action};
-use super::{
-    Candidate, Owner, PIECE_UNITS, Progress, Refinement, Root, RootShading, Shading, Stage,
-};
+use super::{Candidate, Owner, Progress, Refinement, Root, RootShading, Shading, Stage};
 use crate::backend::{Fill, Patch};
 use crate::geometry::Bary;
 use crate::highlight;
 use crate::illumination::{self, ActiveLights, ShadingKit};
 use crate::refine::{LeafId, LeafState, PlanOutcome, SplitOutcome};
 use crate::schedule::{Allowance, cost};
+
+/// Nominal nanoseconds of the first planning pieces, the painting they ask for included. Patches are painted in list order, so what is
+/// planned first keeps everything found later waiting.
+const FIRST_PLANS: u64 = 20_000;
+
+/// The same of the longest, which keep all threads busy.
+const LONGEST_PLANS: u64 = 400_000;
+
+/// In between, a piece is this part of all that was planned before it.
+const PLANS_SHARE: u64 = 16;
 
 impl Refinement {
     /// Takes up the best candidates. False when there are none, or the budget does not admit the next one.
@@ -20,7 +28,9 @@ impl Refinement {
         allowance: &mut Allowance<'_>,
     ) -> bool {
         let mut units = 0;
-        while units < PIECE_UNITS {
+        let limit = (self.planned_units / PLANS_SHARE).clamp(FIRST_PLANS, LONGEST_PLANS);
+        let mut to_paint = 0.0;
+        while units + to_paint as u64 <= limit {
             let Some(candidate) = self.next_candidate() else {
                 break;
             };
@@ -40,11 +50,13 @@ impl Refinement {
                 self.deferred.push(candidate);
                 break;
             }
+            to_paint += self.painting_cost(stage, candidate, action);
             self.plan(stage, candidate, action);
             units += more + std::mem::take(&mut self.units_for_bounds);
         }
         self.conclude_plans(stage);
         allowance.spend(units);
+        self.planned_units += units + to_paint as u64;
         let mut deferred = std::mem::take(&mut self.deferred);
         for candidate in deferred.drain(..) {
             self.offer(stage, candidate);
@@ -99,6 +111,25 @@ impl Refinement {
             }
         };
         units as u64
+    }
+
+    /// About what painting will cost that a candidate asks for.
+    fn painting_cost(&self, stage: &Stage<'_>, candidate: Candidate, action: Action) -> f32 {
+        let (pixels, is_root) = match candidate {
+            Candidate::Root(index) => (self.roots[index as usize].pixels as f32, true),
+            Candidate::Leaf(leaf) => (self.forest.leaf(leaf).pixels as f32, false),
+            Candidate::Part(part) => (self.parts[part as usize].pixels, false),
+        };
+        match action {
+            // It is only looked at.
+            Action::Split(_) if is_root => 0.0,
+            Action::Shade if !is_root && parts::is_large(pixels) => 0.0,
+            Action::Split(marks) => {
+                let edges = marks.count_ones() as f32;
+                cost::repaint(edges + 1.0, pixels * (1.0 + 0.5 * edges))
+            }
+            Action::Shade => cost::phong(pixels, stage.world.lights.len()),
+        }
     }
 
     /// What bounding the lights on the candidate's root will cost, should it come to that.
