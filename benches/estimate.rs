@@ -207,7 +207,7 @@ impl Arguments {
                         .push(sides.ok_or("a size is like 1280x720")?);
                 }
                 "--views" => {
-                    arguments.views = value()?.parse().map_err(|_| "views are a number")?
+                    arguments.views = value()?.parse().map_err(|_| "views are a number")?;
                 }
                 "--csv" => arguments.csv = Some(value()?),
                 "--test" => is_test = true,
