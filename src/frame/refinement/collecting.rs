@@ -31,8 +31,15 @@ const BLOCKS_IN_SHARE: usize = 64;
 /// Materials in a block, as a rule at most.
 const MATERIALS_IN_BLOCK: usize = 4;
 
-/// A triangle of fewer pixels is ranked by its corners alone: a sample would cost as much as shading some of them.
-const PIXELS_FOR_CENTROID: u32 = 8;
+/// A triangle of so many pixels has its centroid sampled, whatever its corners say: it may hide a highlight.
+const PIXELS_FOR_CENTROID: u32 = 64;
+
+/// So has a smaller one where the corners let expect such a sum of squared errors. Nine tenths of the error of tiny triangles is in a
+/// fifth of them, which the corners tell from the others; to sample all would cost as much as shading some of them.
+const MASS_FOR_CENTROID: f32 = 0.125;
+
+/// About as many triangles have so many pixels as are sampled: by that the cost of collecting is told in advance.
+const PIXELS_AS_A_RULE: u32 = 8;
 
 /// Most vertices of a block, and one more; a power of two, as no index is checked then.
 const LISTED: usize = (3 * BLOCK + 1).next_power_of_two();
@@ -195,12 +202,15 @@ impl Collector {
     /// Puts what is remembered in place of guesses, and chooses among the other triangles those whose centroids are sampled.
     fn recall(&mut self, source: &Source<'_>, roots: &mut [Root]) {
         for (root, is_sampled) in roots.iter_mut().zip(self.is_sampled.iter_mut()) {
-            *is_sampled = root.pixels >= PIXELS_FOR_CENTROID;
+            let mass = root.pixels as f32 * root.prior;
+            *is_sampled = root.pixels >= PIXELS_FOR_CENTROID || mass >= MASS_FOR_CENTROID;
             if let Some(memory) = source.memory
                 && let Some(error) = memory.recall(root.triangle)
             {
                 root.prior = error.max(ranking::ERROR_FLOOR);
                 *is_sampled = false;
+            } else if !*is_sampled {
+                root.prior = ranking::unsampled_error(root.prior);
             }
         }
     }
@@ -229,7 +239,8 @@ impl Collector {
         samples.illuminate(exec, world, view);
         for (sample, index) in sampled().enumerate() {
             let [r, g, b] = samples.deviation(sample);
-            roots[index].prior += ranking::CENTROID_SHARE * (r * r + g * g + b * b) / 3.0;
+            let square = (r * r + g * g + b * b) / 3.0;
+            roots[index].prior += ranking::centroid_error(square, roots[index].is_pht);
         }
     }
 }
@@ -293,7 +304,7 @@ impl Refinement {
         for block in left.chunks(BLOCK) {
             for &triangle in block {
                 let pixels = stage.backend.visible_pixels(triangle);
-                let is_sampled = pixels >= PIXELS_FOR_CENTROID && !self.by_area;
+                let is_sampled = pixels >= PIXELS_AS_A_RULE && !self.by_area;
                 units += each + if is_sampled { sample } else { 0.0 };
                 self.places.push(triangle);
                 self.roots.push(Root::new(triangle, pixels));

@@ -111,7 +111,8 @@ impl Root {
 
     /// Its share of the expected sum of squared errors while it has not been looked at.
     fn mass(&self) -> f64 {
-        f64::from(self.pixels) * f64::from(self.prior)
+        let error = (self.prior - ranking::ERROR_FLOOR).max(0.0);
+        f64::from(self.pixels) * f64::from(ranking::rounded_error(error))
     }
 }
 
@@ -158,6 +159,8 @@ struct Paint {
     patch: Patch,
     owner: Owner,
     units: u32,
+    /// What it takes away from the sum of squared errors, by what is known; see [`error_mass`](Refinement::error_mass).
+    benefit: f64,
 }
 
 /// A leaf's patches that are still to be painted, or its parts still to be shaded, and its pixels counted so far.
@@ -189,6 +192,8 @@ pub(super) struct Refinement {
     shadings: Vec<RootShading>,
     collectors: Vec<Collector>,
     paints: VecDeque<Paint>,
+    /// Nominal cost of all plans so far, and of painting what they ask for.
+    planned_units: u64,
     /// How many patches were put on the list so far, which numbers them from 1.
     enqueued: u32,
     parts: Vec<Part>,
@@ -206,8 +211,11 @@ pub(super) struct Refinement {
     pixels: u64,
     /// By leaf.
     progressing: Vec<Progressing>,
-    /// Expected sum of squared errors over the pixels of all roots, per channel, in squared codes.
+    /// Expected sum of squared errors over the pixels of all roots once everything planned has been painted, per channel, in
+    /// squared codes.
     error_mass: f64,
+    /// What is to be added to it as long as what is planned has not been painted: the benefit of all `paints`.
+    benefit_to_paint: f64,
     counters: Counters,
     /// Nominal cost of the bounds found by the candidate being planned.
     units_for_bounds: u64,
@@ -242,6 +250,7 @@ impl Refinement {
         self.shadings.clear();
         self.paints.clear();
         self.enqueued = 0;
+        self.planned_units = 0;
         self.progressing.clear();
         self.parts.clear();
         self.samples.clear();
@@ -250,6 +259,7 @@ impl Refinement {
         self.pixels_to_draw = 0;
         self.pixels = 0;
         self.error_mass = 0.0;
+        self.benefit_to_paint = 0.0;
         self.counters = Counters::default();
     }
 
@@ -353,7 +363,8 @@ impl Refinement {
         if self.is_collecting() && self.roots.is_empty() {
             return f64::NAN;
         }
-        (self.error_mass.max(0.0) / self.pixels.max(1) as f64).sqrt()
+        let mass = self.error_mass + self.benefit_to_paint;
+        (mass.max(0.0) / self.pixels.max(1) as f64).sqrt()
     }
 
     /// Whether the budget asks for no better image.
@@ -381,7 +392,7 @@ impl Refinement {
     /// A leaf's share of the expected sum of squared errors.
     fn leaf_mass(&self, leaf: LeafId) -> f64 {
         let leaf = self.forest.leaf(leaf);
-        f64::from(leaf.pixels) * f64::from(leaf.error)
+        f64::from(leaf.pixels) * f64::from(ranking::rounded_error(leaf.error))
     }
 
     /// The place in `roots` of a visible triangle.

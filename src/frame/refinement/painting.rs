@@ -32,7 +32,12 @@ impl Refinement {
             units = with_next;
             self.piece.push(paint.patch);
             self.owners.push(paint.owner);
+            self.benefit_to_paint -= paint.benefit;
             self.paints.pop_front();
+        }
+        if self.paints.is_empty() {
+            // Whatever rounding has left.
+            self.benefit_to_paint = 0.0;
         }
         if self.piece.is_empty() {
             return false;
@@ -79,7 +84,7 @@ impl Refinement {
     }
 
     /// Puts a patch of about `pixels` pixels on the list, cut into quarters until each is small enough.
-    pub(super) fn enqueue(&mut self, owner: Owner, patch: Patch, pixels: f32) {
+    pub(super) fn enqueue(&mut self, owner: Owner, patch: Patch, pixels: f32, benefit: f64) {
         let units = match patch.fill {
             Fill::Gouraud(_) => cost::repaint(1.0, pixels),
             Fill::Phong { lights, .. } => cost::phong(pixels, lights.diffuse.len()),
@@ -88,7 +93,7 @@ impl Refinement {
             && let Some(quarters) = quarter(&patch)
         {
             for part in quarters {
-                self.enqueue(owner, part, pixels * 0.25);
+                self.enqueue(owner, part, pixels * 0.25, benefit * 0.25);
             }
             return;
         }
@@ -103,7 +108,9 @@ impl Refinement {
             patch,
             owner,
             units: units as u32,
+            benefit,
         });
+        self.benefit_to_paint += benefit;
     }
 }
 

@@ -60,7 +60,7 @@ pub(super) enum PartState {
 impl Part {
     /// Its share of the expected sum of squared errors.
     fn mass(&self) -> f64 {
-        f64::from(self.pixels) * f64::from(self.error)
+        f64::from(self.pixels) * f64::from(ranking::rounded_error(self.error))
     }
 }
 
@@ -212,7 +212,7 @@ impl Refinement {
                 fill: Fill::Phong { lights, remainder },
                 pixels: 0,
             };
-            self.enqueue(Owner::Nobody, patch, part.pixels);
+            self.enqueue(Owner::Nobody, patch, part.pixels, part.mass());
         }
     }
 }

@@ -10,9 +10,15 @@ use crate::illumination::{self, ActiveLights, ShadingKit};
 use crate::refine::{LeafId, LeafState, PlanOutcome, SplitOutcome};
 use crate::schedule::{Allowance, cost};
 
-/// Nominal nanoseconds of a planning piece, the painting it asks for included: patches are painted in list order, so
-/// what is planned first keeps everything found later waiting.
-const PLANNING_UNITS: u64 = 20_000;
+/// Nominal nanoseconds of the first planning pieces, the painting they ask for included. Patches are painted in list order, so what is
+/// planned first keeps everything found later waiting.
+const FIRST_PLANS: u64 = 20_000;
+
+/// The same of the longest, which keep all threads busy.
+const LONGEST_PLANS: u64 = 400_000;
+
+/// In between, a piece is this part of all that was planned before it.
+const PLANS_SHARE: u64 = 16;
 
 impl Refinement {
     /// Takes up the best candidates. False when there are none, or the budget does not admit the next one.
@@ -22,8 +28,9 @@ impl Refinement {
         allowance: &mut Allowance<'_>,
     ) -> bool {
         let mut units = 0;
+        let limit = (self.planned_units / PLANS_SHARE).clamp(FIRST_PLANS, LONGEST_PLANS);
         let mut to_paint = 0.0;
-        while units + to_paint as u64 <= PLANNING_UNITS {
+        while units + to_paint as u64 <= limit {
             let Some(candidate) = self.next_candidate() else {
                 break;
             };
@@ -49,6 +56,7 @@ impl Refinement {
         }
         self.conclude_plans(stage);
         allowance.spend(units);
+        self.planned_units += units + to_paint as u64;
         let mut deferred = std::mem::take(&mut self.deferred);
         for candidate in deferred.drain(..) {
             self.offer(stage, candidate);
@@ -113,12 +121,13 @@ impl Refinement {
             Candidate::Part(part) => (self.parts[part as usize].pixels, false),
         };
         match action {
+            // It is only looked at.
             Action::Split(_) if is_root => 0.0,
+            Action::Shade if !is_root && parts::is_large(pixels) => 0.0,
             Action::Split(marks) => {
                 let edges = marks.count_ones() as f32;
                 cost::repaint(edges + 1.0, pixels * (1.0 + 0.5 * edges))
             }
-            Action::Shade if !is_root && parts::is_large(pixels) => 0.0,
             Action::Shade => cost::phong(pixels, stage.world.lights.len()),
         }
     }
@@ -234,6 +243,7 @@ impl Refinement {
     }
 
     fn note_split(&mut self, stage: &Stage<'_>, split: &SplitOutcome) {
+        let mass_before = self.error_mass;
         let children = match split {
             SplitOutcome::Rejected { leaf, error } => {
                 self.error_mass -= self.leaf_mass(*leaf);
@@ -253,8 +263,13 @@ impl Refinement {
                 children.clone()
             }
         };
-        for child in children {
+        for child in children.clone() {
             self.error_mass += self.leaf_mass(child);
+        }
+        let pixels = children.clone().map(|child| self.forest.leaf(child).pixels);
+        let pixels = pixels.map(f64::from).sum::<f64>().max(1.0);
+        let benefit_per_pixel = (mass_before - self.error_mass) / pixels;
+        for child in children {
             if self.is_drawn_once {
                 self.offer_leaf(stage, child);
                 continue;
@@ -267,7 +282,8 @@ impl Refinement {
                 pixels: 0,
             };
             let pixels = leaf.pixels as f32;
-            self.enqueue(Owner::Leaf(child), patch, pixels);
+            let benefit = benefit_per_pixel * f64::from(pixels);
+            self.enqueue(Owner::Leaf(child), patch, pixels, benefit);
         }
     }
 
@@ -276,7 +292,7 @@ impl Refinement {
         let root = self.roots[index as usize];
         self.roots[index as usize].progress = Progress::Done;
         self.error_mass -= root.mass();
-        self.shade_patch(stage, index, Bary::ROOT, root.pixels);
+        self.shade_patch(stage, index, Bary::ROOT, root.pixels, root.mass());
         let place = self.roots[index as usize].shading as usize;
         if let Some(shading) = self.shadings.get_mut(place) {
             shading.last_paint = self.enqueued;
@@ -285,17 +301,25 @@ impl Refinement {
 
     /// Has the pixels of a leaf shaded.
     fn shade_leaf(&mut self, stage: &Stage<'_>, id: LeafId) {
-        self.error_mass -= self.leaf_mass(id);
+        let mass = self.leaf_mass(id);
+        self.error_mass -= mass;
         self.forest.close(stage.world, id);
         let leaf = self.forest.leaf(id);
         let (corners, pixels) = (leaf.corners, leaf.pixels);
         if let Some(index) = self.root_of(leaf.triangle) {
-            self.shade_patch(stage, index, corners, pixels);
+            self.shade_patch(stage, index, corners, pixels, mass);
             self.leaf_progress(id).last_paint = self.enqueued;
         }
     }
 
-    fn shade_patch(&mut self, stage: &Stage<'_>, index: u32, corners: [Bary; 3], pixels: u32) {
+    fn shade_patch(
+        &mut self,
+        stage: &Stage<'_>,
+        index: u32,
+        corners: [Bary; 3],
+        pixels: u32,
+        mass: f64,
+    ) {
         let Shading::PerPixel(lights, remainder) = self.shading(stage, index) else {
             return;
         };
@@ -306,7 +330,7 @@ impl Refinement {
             fill: Fill::Phong { lights, remainder },
             pixels: 0,
         };
-        self.enqueue(Owner::Nobody, patch, pixels as f32);
+        self.enqueue(Owner::Nobody, patch, pixels as f32, mass);
     }
 
     /// Which terms the pixels of a root need: by its bounds, if finding those costs less than they may save.
