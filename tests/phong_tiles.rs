@@ -114,9 +114,9 @@ fn no_square_is_begun_past_the_deadline() {
     let scene = scene();
     // Each look at the clock takes 10 microseconds, and nothing else takes any time.
     let clock = || Arc::new(ManualClock::with_step_ns(10_000));
-    let render = |budget: Budget| {
+    let render = |method, budget: Budget| {
         let options = EngineOptions {
-            method: Method::PhongTiles,
+            method,
             threads: Some(1),
             clock: clock(),
             ..EngineOptions::default()
@@ -124,9 +124,12 @@ fn no_square_is_begun_past_the_deadline() {
         let mut engine = Engine::with_options(&scene, options).expect("one thread");
         engine.render(&scene, budget, &mut Frame::new(SIZE.0, SIZE.1))
     };
-    let first = render(Budget::from_millis(0.0));
-    assert_eq!(first.phong_pixels, 0);
-    let some = render(Budget::from_millis(first.frame_ms + 0.15));
+    let none = render(Method::PhongTiles, Budget::from_millis(0.0));
+    assert_eq!(none.phong_pixels, 0);
+    // As long as the first image takes, with all looks at the clock, and some squares.
+    let first = render(Method::Gouraud, Budget::from_millis(1000.0));
+    let budget = Budget::from_millis(first.frame_ms + 0.15);
+    let some = render(Method::PhongTiles, budget);
     assert!(some.phong_pixels > 0 && !some.converged, "{some:?}");
     assert!(some.overshoot_ms() <= Some(0.05), "{some:?}");
 }
