@@ -113,18 +113,23 @@ fn small_budgets_add_up_and_a_final_image_costs_nothing() {
 fn no_square_is_begun_past_the_deadline() {
     let scene = scene();
     // Each look at the clock takes 10 microseconds, and nothing else takes any time.
-    let options = EngineOptions {
-        method: Method::PhongTiles,
-        threads: Some(1),
-        clock: Arc::new(ManualClock::with_step_ns(10_000)),
-        ..EngineOptions::default()
+    let clock = || Arc::new(ManualClock::with_step_ns(10_000));
+    let render = |method, budget: Budget| {
+        let options = EngineOptions {
+            method,
+            threads: Some(1),
+            clock: clock(),
+            ..EngineOptions::default()
+        };
+        let mut engine = Engine::with_options(&scene, options).expect("one thread");
+        engine.render(&scene, budget, &mut Frame::new(SIZE.0, SIZE.1))
     };
-    let mut engine = Engine::with_options(&scene, options).expect("one thread");
-    let mut frame = Frame::new(SIZE.0, SIZE.1);
-    // The first image takes as long as it takes, and the next frame has all of its time for squares.
-    let first = engine.render(&scene, Budget::from_millis(0.0), &mut frame);
-    assert_eq!(first.phong_pixels, 0);
-    let some = engine.render(&scene, Budget::from_millis(0.15), &mut frame);
+    let none = render(Method::PhongTiles, Budget::from_millis(0.0));
+    assert_eq!(none.phong_pixels, 0);
+    // As long as the first image takes, with all looks at the clock, and some squares.
+    let first = render(Method::Gouraud, Budget::from_millis(1000.0));
+    let budget = Budget::from_millis(first.frame_ms + 0.15);
+    let some = render(Method::PhongTiles, budget);
     assert!(some.phong_pixels > 0 && !some.converged, "{some:?}");
     assert!(some.overshoot_ms() <= Some(0.05), "{some:?}");
 }

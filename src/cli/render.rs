@@ -125,16 +125,14 @@ pub(super) fn run(args: &Render) -> Result<(), Failure> {
         let stats = engine.render(&scene, budget, &mut frame);
         is_empty = stats.covered_pixels == 0;
         run.check(number, &frame)?;
-        log.frames.push(LoggedFrame {
-            record: stats.record,
-            frame_ms: stats.frame_ms,
-            outcome: stats.outcome.name().to_owned(),
-            image: if args.record.is_some() {
-                checksum(&frame)
-            } else {
-                String::new()
-            },
-        });
+        if args.record.is_some() {
+            log.frames.push(LoggedFrame {
+                record: stats.record,
+                frame_ms: stats.frame_ms,
+                outcome: stats.outcome.name().to_owned(),
+                image: checksum(&frame),
+            });
+        }
         let is_last = number == run.count();
         let error = (args.error && is_last)
             .then(|| compare(&engine, &scene, &frame, args))

@@ -176,24 +176,25 @@ impl Engine {
     /// Forgets the current image, and what was found out in those before, so that the next frame starts cold. Memory stays
     /// allocated and threads stay awake.
     pub fn forget(&mut self) {
-        self.renderer.shelf.forget();
+        self.renderer.forget();
     }
 
     /// Goes on with the last frame's image in spare time, until `deadline_ms` of the engine's [clock](EngineOptions::clock), the
     /// image is final, or the [token](Self::cancel_token) is cancelled. Returns whether the image is final.
     ///
-    /// The next frame of the same view starts from what has been done.
+    /// The next frame of the same view starts from what has been done. That is in no [record](FrameStats::record): a program that uses spare
+    /// time cannot replay its frames.
     pub fn refine_until(&mut self, deadline_ms: f64) -> bool {
         let start_ms = self.clock.now_ms();
         let budget = Budget::from_millis(deadline_ms - start_ms);
         // No time at all is not what buys a first image.
-        if budget == Budget::Millis(0.0) {
+        if budget == Budget::Millis(0.0) || self.renderer.is_final() {
             return self.renderer.is_final();
         }
         let allowance = Allowance::new(budget, &*self.clock, start_ms, &self.cancel);
         let mut work = Work::new(self.exec, allowance);
         let renderer = &mut self.renderer;
-        match self.pool.as_ref().filter(|_| !renderer.is_final()) {
+        match &self.pool {
             Some(pool) => pool.install(|| renderer.spend_spare_time(&mut work)),
             None => renderer.spend_spare_time(&mut work),
         }

@@ -72,11 +72,25 @@ impl Handover {
         &self.changed
     }
 
-    /// Pixels that handing over would write.
-    pub(super) fn pending_pixels(&self, shown: Option<&Picture>, target: &Target<'_>) -> u64 {
-        match shown {
-            Some(picture) if picture.divisor == 1 => picture.backend.pending_pixels(target),
-            _ => u64::from(target.width()) * u64::from(target.height()),
+    /// Pixels that handing over would write: of an enlarged image, or the background, all or none.
+    pub(super) fn pending_pixels(&mut self, shown: Option<&Picture>, target: &Target<'_>) -> u64 {
+        let is_there_already = match shown {
+            Some(picture) if picture.divisor == 1 => return picture.backend.pending_pixels(target),
+            Some(picture) => {
+                let pending = |small: &mut Target<'_>| picture.backend.pending_pixels(small);
+                let own = Own::Enlarged(picture.divisor, self.small.stamp());
+                self.is_written_already(own, target)
+                    && self.small.write_in_order(self.small_order, pending) == 0
+            }
+            None => {
+                let is_background = matches!(self.latest, Some(Own::Background(_)));
+                is_background && target.serial_by(self.writer) == Some(self.serial)
+            }
+        };
+        if is_there_already {
+            0
+        } else {
+            u64::from(target.width()) * u64::from(target.height())
         }
     }
 
@@ -154,26 +168,9 @@ impl Handover {
         shown: Option<&Picture>,
         target: &Target<'_>,
     ) -> f64 {
-        let is_there_already = match shown {
-            Some(picture) if picture.divisor == 1 => {
-                return load::pending_ms(costs, &*picture.backend, 1, Some(target), false);
-            }
-            Some(picture) => {
-                let pending = |small: &mut Target<'_>| picture.backend.pending_pixels(small);
-                let own = Own::Enlarged(picture.divisor, self.small.stamp());
-                self.is_written_already(own, target)
-                    && self.small.write_in_order(self.small_order, pending) == 0
-            }
-            None => {
-                let is_background = matches!(self.latest, Some(Own::Background(_)));
-                is_background && target.serial_by(self.writer) == Some(self.serial)
-            }
-        };
-        if is_there_already {
-            return 0.0;
-        }
+        let pixels = self.pending_pixels(shown, target);
         let divisor = shown.map_or(1, |picture| picture.divisor);
-        load::handing_over_ms(costs, [target.width(), target.height()], divisor)
+        load::pixels_ms(costs, pixels, divisor)
     }
 
     fn is_written_already(&self, own: Own, target: &Target<'_>) -> bool {

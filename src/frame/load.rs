@@ -108,11 +108,16 @@ fn pixels(view: &View) -> f64 {
 
 /// Milliseconds that handing over all pixels of an image will probably not exceed.
 pub(super) fn handing_over_ms(costs: &CostModel, [width, height]: [u32; 2], divisor: u32) -> f64 {
-    let pixels = f64::from(width) * f64::from(height);
+    pixels_ms(costs, u64::from(width) * u64::from(height), divisor)
+}
+
+/// Milliseconds that handing over so many pixels of an image of that divisor will probably not exceed.
+pub(super) fn pixels_ms(costs: &CostModel, pixels: u64, divisor: u32) -> f64 {
     if divisor == 1 {
-        return costs.predict_at_most_ms(Kind::Present, present(pixels as u64));
+        costs.predict_at_most_ms(Kind::Present, present(pixels))
+    } else {
+        costs.predict_at_most_ms(Kind::Enlarge, enlarge(pixels as f64))
     }
-    costs.predict_at_most_ms(Kind::Enlarge, enlarge(pixels))
 }
 
 /// Milliseconds that handing the backend's image over to `target` will probably not exceed, and a margin; `as_a_whole` if all of it will
@@ -128,8 +133,7 @@ pub(super) fn pending_ms(
         return MARGIN_MS;
     };
     let ms = if divisor == 1 && !as_a_whole {
-        let pending = backend.pending_pixels(target);
-        costs.predict_at_most_ms(Kind::Present, present(pending))
+        pixels_ms(costs, backend.pending_pixels(target), 1)
     } else {
         // Enlarged images are written as a whole.
         handing_over_ms(costs, [target.width(), target.height()], divisor)

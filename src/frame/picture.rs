@@ -60,6 +60,8 @@ pub(super) struct Picture {
     /// One pixel stands for `divisor` by `divisor` pixels of the target.
     pub(super) divisor: u32,
     pass: Pass,
+    /// Whether its first image has been begun, and neither completed nor given up.
+    is_begun: bool,
     /// What of the image before may be kept.
     motion: Motion,
     /// Whether the stage in hand is yet to be begun.
@@ -85,6 +87,14 @@ pub(super) struct Studio<'a> {
     pub(super) predicted: &'a mut StageTimes,
 }
 
+impl Studio<'_> {
+    /// Milliseconds that giving the image of `view` its colours will probably not exceed.
+    pub(super) fn colouring_ms(&self, view: &View) -> f64 {
+        let load = (self.load).resolve(self.method, self.world.lights.len(), view);
+        self.costs.predict_at_most_ms(Kind::Resolve, load)
+    }
+}
+
 impl Picture {
     pub(super) fn new(backend: Box<dyn Backend>) -> Self {
         Self {
@@ -96,6 +106,7 @@ impl Picture {
             view: None,
             divisor: 1,
             pass: Pass::Empty,
+            is_begun: false,
             motion: Motion::default(),
             is_fresh: true,
             stage_ms: 0.0,
@@ -113,6 +124,7 @@ impl Picture {
     /// Forgets who owns which pixel.
     pub(super) fn forget(&mut self) {
         self.enter(Pass::Empty);
+        self.is_begun = false;
         self.motion.forget();
         self.right_in = None;
     }
@@ -120,6 +132,7 @@ impl Picture {
     /// Forgets who owns the pixels that objects which have moved touch. `moved` are their triangles, ascending.
     pub(super) fn move_objects(&mut self, moved: &[Range<u32>]) {
         self.enter(Pass::Empty);
+        self.is_begun = false;
         self.motion.add(moved);
         self.right_in = None;
     }
@@ -127,6 +140,7 @@ impl Picture {
     /// Forgets colours, as after lights have changed.
     pub(super) fn forget_colours(&mut self) {
         self.motion.has_its_light = false;
+        self.is_begun = false;
         if self.pass > Pass::Lighting {
             self.enter(Pass::Lighting);
         }
@@ -149,7 +163,7 @@ impl Picture {
     }
 
     pub(super) fn is_in_hand(&self) -> bool {
-        !matches!(self.pass, Pass::Empty | Pass::Done)
+        self.is_begun
     }
 
     /// The view of its image, once that has been published.
@@ -169,6 +183,7 @@ impl Picture {
 
     /// Notes that its image is the one to be shown and refined from now on.
     pub(super) fn publish(&mut self) {
+        self.is_begun = false;
         self.enter(Pass::Done);
     }
 
@@ -213,6 +228,7 @@ impl Picture {
             self.view = Some(view);
             self.divisor = divisor;
         }
+        self.is_begun = true;
         self.right_in = frame.or(self.right_in);
     }
 
@@ -281,7 +297,6 @@ impl Picture {
         }
         studio.predicted.resolve += self.learn(studio.costs, Kind::Resolve, load);
         self.motion.has_its_light = true;
-        self.begin_refinement(studio, allowance, &view);
         self.enter(Pass::Coloured);
         true
     }

@@ -88,6 +88,12 @@ impl Renderer {
         }
     }
 
+    /// Forgets all images, so that the next frame starts cold.
+    pub(super) fn forget(&mut self) {
+        self.shelf.forget();
+        self.last_view = None;
+    }
+
     /// One frame: draw the first image if there is none, refine it while the budget lasts, hand it over.
     pub(super) fn render(
         &mut self,
@@ -123,7 +129,7 @@ impl Renderer {
 
     /// Whether a frame has enough to do to share it among threads. Not so where nothing has changed and nothing is left to be
     /// refined or handed over, nor where a single image is drawn sooner than threads can be woken.
-    pub(super) fn needs_threads(&self, scene: &Scene, target: &Target<'_>) -> bool {
+    pub(super) fn needs_threads(&mut self, scene: &Scene, target: &Target<'_>) -> bool {
         let lights = scene.lights().len();
         let pixels = target.width() as f32 * target.height() as f32;
         let triangles = scene.triangle_count() as f32;
@@ -217,7 +223,7 @@ impl Renderer {
             .shelf
             .shown_mut()
             .filter(|picture| fits(picture, target));
-        let divisor = shown.as_ref().map_or(1, |picture| picture.divisor);
+        let divisor = shown.as_ref().map(|picture| picture.divisor);
         let pixels = match shown {
             Some(picture) => self.handover.present(work.exec, picture, target),
             None => {
@@ -229,7 +235,10 @@ impl Renderer {
         self.handover.note(target);
         let ms = work.allowance.elapsed_ms() - since;
         work.stages.present += ms;
-        work.predicted.present += Handover::learn(&mut self.costs, divisor, pixels, ms);
+        // Filling says nothing about what copying takes.
+        if let Some(divisor) = divisor {
+            work.predicted.present += Handover::learn(&mut self.costs, divisor, pixels, ms);
+        }
         pixels
     }
 

@@ -19,9 +19,9 @@ use crate::clock::Clock;
 ///    of the camera and scene as they were when it was begun. Until it is complete the image before it stays
 ///    ([`Outcome::Stale`](crate::frame::Outcome::Stale)); without one the frame shows the background.
 ///
-/// Nothing is silently left out of the picture, and the outcome says which case it was. Four things are not interrupted: placing objects that have moved,
-/// making ready for a replaced scene or another image size, colouring a first image and handing an image over. The last two are
-/// predicted, and not begun when they would not end in time. A budget less than handing over takes cannot be
+/// Nothing is silently left out of the picture, and the outcome says which case it was. Not interrupted are: placing objects that have moved,
+/// making ready for a replaced scene or another image size, culling (some 10 microseconds for a thousand clusters), colouring a first image in place of
+/// the one shown, and handing an image over. The last two are predicted, and not begun when they would not end in time. A budget less than handing over takes cannot be
 /// kept; the frame is as little late as can be, and draws a piece of the image all the same. Backends other than the software one draw a first image as a
 /// whole, late if need be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,6 +222,15 @@ impl<'a> Allowance<'a> {
         matches!(self.budget, Budget::Millis(_))
     }
 
+    /// Whether there is a deadline, less the reserve, that has not come yet: if work was refused, then because it would take too long.
+    #[must_use]
+    pub fn is_before_deadline(&self) -> bool {
+        match self.budget {
+            Budget::Millis(ms) => !self.is_cancelled() && self.elapsed_ms() + self.reserve_ms < ms,
+            _ => false,
+        }
+    }
+
     /// Whether the frame, or the one that is replayed, has a wall-clock budget.
     #[must_use]
     pub fn is_timed(&self) -> bool {
@@ -232,7 +241,8 @@ impl<'a> Allowance<'a> {
     }
 
     /// Whether refinement is to stop: a replay has been stopped already, when it was recorded.
-    fn is_cancelled(&self) -> bool {
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
         self.cancel.is_cancelled() && !matches!(self.budget, Budget::Replay(_))
     }
 

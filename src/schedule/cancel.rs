@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Stops an engine from another thread: clones share one state.
 ///
-/// While it is cancelled, a wall-clock budget is over: the engine returns when the piece of work in hand is done, as it does at a deadline,
+/// While it is cancelled, a wall-clock budget (but for one of zero, which buys a first image) is over: the engine returns when the piece of work in hand is done, as it does at a deadline,
 /// and goes on with the image once the token is [reset](Self::reset). Other budgets end their refinement, too, but complete a first
 /// image.
 #[derive(Clone, Debug, Default)]

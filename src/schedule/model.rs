@@ -178,8 +178,7 @@ impl Rate {
         let seen = self.seen;
         self.seen = seen.saturating_add(1);
         if seen == 0 {
-            self.items = (self.items * ratio).max(LEAST_RATE);
-            self.pixels = (self.pixels * ratio).max(LEAST_RATE);
+            self.set(self.items * ratio, self.pixels * ratio);
             return;
         }
         if seen < FIRST {
@@ -193,8 +192,12 @@ impl Rate {
 
     /// Lowers the rate. What is thought to take too long for any frame is never measured again, so nothing else would.
     pub fn doubt(&mut self) {
-        self.items = (self.items * DOUBT).max(LEAST_RATE);
-        self.pixels = (self.pixels * DOUBT).max(LEAST_RATE);
+        self.set(self.items * DOUBT, self.pixels * DOUBT);
+    }
+
+    fn set(&mut self, items: f64, pixels: f64) {
+        self.items = items.clamp(LEAST_RATE, 1.0 / LEAST_RATE);
+        self.pixels = pixels.clamp(LEAST_RATE, 1.0 / LEAST_RATE);
     }
 
     /// Changes the rate as little as possible, so that the load is predicted to take `ms` more.
@@ -203,8 +206,7 @@ impl Rate {
         let scale = ms / (x * x + y * y);
         // Loads of some picoseconds have no square in f64.
         if scale.is_finite() {
-            self.items = (self.items + scale * x).max(LEAST_RATE);
-            self.pixels = (self.pixels + scale * y).max(LEAST_RATE);
+            self.set(self.items + scale * x, self.pixels + scale * y);
         }
     }
 }

@@ -27,6 +27,7 @@ mod judge;
 mod lanes;
 mod moved;
 mod outline;
+mod owners;
 mod patch;
 mod pixel_batch;
 mod planes;

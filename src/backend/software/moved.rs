@@ -66,6 +66,9 @@ impl SoftwareBackend {
             return false;
         }
         self.shares.keep_unmoved(geometry, moved);
+        if self.shares.used().iter().all(|share| share.is_new) {
+            return false;
+        }
         for drawing in &mut self.drawings {
             *drawing = Drawing::Done;
         }

@@ -7,7 +7,7 @@ use crate::frame::refinement::Stage;
 use crate::frame::stats::StageTimes;
 use crate::output::Target;
 use crate::parallel::Exec;
-use crate::scene::{View, World};
+use crate::scene::World;
 use crate::schedule::{Allowance, CostModel, Kind, Load};
 
 /// What refining needs besides the picture itself.
@@ -68,7 +68,8 @@ impl Picture {
         }
         let mut since = allowance.elapsed_ms();
         let has_frame_to_itself = allowance.record().images == 0;
-        while !refinement.satisfies(allowance) {
+        // The error of squares is not estimated.
+        while easel.method == Method::PhongTiles || !refinement.satisfies(allowance) {
             let presenting_ms = load::pending_ms(
                 easel.costs,
                 stage.backend,
@@ -97,7 +98,8 @@ impl Picture {
                     Method::PhongTiles => self.tiles.is_finished(),
                     _ => refinement.is_finished(),
                 };
-                if has_frame_to_itself && allowance.nominal_ns() == 0 && !is_finished {
+                let is_idle = has_frame_to_itself && allowance.nominal_ns() == 0;
+                if is_idle && !is_finished && allowance.is_before_deadline() {
                     easel.costs.doubt(kind);
                 }
                 break;
@@ -107,21 +109,26 @@ impl Picture {
     }
 
     /// Begins the refinement of a first image that has got its colours.
-    pub(super) fn begin_refinement(
+    pub(in crate::frame) fn begin_refinement(
         &mut self,
-        studio: &Studio<'_>,
+        studio: &mut Studio<'_>,
         allowance: &Allowance<'_>,
-        view: &View,
     ) {
+        let Some(view) = self.view else {
+            return;
+        };
+        let since = allowance.elapsed_ms();
         if studio.method == Method::PhongTiles {
-            self.tiles.begin(view, &*self.backend);
+            self.tiles.begin(&view, &*self.backend);
         }
-        if !studio.method.refines_triangles() {
-            return self.refinement.clear();
+        if studio.method.refines_triangles() {
+            self.refinement.set_remembering(allowance.is_timed());
+            let (exec, method, world) = (studio.exec, studio.method, studio.world);
+            self.refinement
+                .begin(exec, method, world, &view, &self.base, &*self.backend);
+        } else {
+            self.refinement.clear();
         }
-        self.refinement.set_remembering(allowance.is_timed());
-        let (exec, method, world) = (studio.exec, studio.method, studio.world);
-        self.refinement
-            .begin(exec, method, world, view, &self.base, &*self.backend);
+        studio.stages.classify += allowance.elapsed_ms() - since;
     }
 }

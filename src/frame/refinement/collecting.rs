@@ -283,7 +283,9 @@ impl Refinement {
         let lights = stage.world.lights.len();
         let each = cost::collecting(1.0, lights) + cost::samples(1, lights);
         let left = (self.visible - self.roots.len()) as f32 * each;
-        if !allowance.admit_free(limit.min(left as u64)) {
+        // A block is taken as a whole.
+        let least = (BLOCK as f32 * each) as u64;
+        if !allowance.admit_free(limit.max(least).min(left as u64)) {
             return false;
         }
         let first = self.roots.len();

@@ -181,6 +181,8 @@ pub(super) struct Refinement {
     /// Candidates, apart from the roots that nobody has asked for yet.
     queue: RankedQueue<Candidate>,
     ranked_roots: RankedList,
+    /// The candidate that the last budget refused: the next to be taken up.
+    held: Option<Candidate>,
     /// How many triangles are visible: `roots` once all of them are collected.
     visible: usize,
     /// In the order of their triangles.
@@ -245,6 +247,7 @@ impl Refinement {
     pub(super) fn clear(&mut self) {
         self.queue.clear();
         self.ranked_roots.clear();
+        self.held = None;
         self.visible = 0;
         self.roots.clear();
         self.shadings.clear();
@@ -296,6 +299,7 @@ impl Refinement {
     /// Whether there is nothing left to refine.
     pub(super) fn is_finished(&self) -> bool {
         !self.is_collecting()
+            && self.held.is_none()
             && self.ranked_roots.best().is_none()
             && self.queue.is_empty()
             && self.paints.is_empty()

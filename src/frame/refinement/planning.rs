@@ -47,7 +47,8 @@ impl Refinement {
             let more = self.planning_cost(stage, candidate, action);
             let bounds = self.bounds_cost(stage, candidate);
             if !allowance.admit(units + more + bounds) {
-                self.deferred.push(candidate);
+                // It stays the next one: a refusal must not change the order.
+                self.held = Some(candidate);
                 break;
             }
             to_paint += self.painting_cost(stage, candidate, action);
@@ -65,8 +66,11 @@ impl Refinement {
         units > 0
     }
 
-    /// Takes the best candidate; among equals those come first that were collected.
+    /// Takes the candidate that was refused last, or the best one; among equals those come first that were collected.
     fn next_candidate(&mut self) -> Option<Candidate> {
+        if self.held.is_some() {
+            return self.held.take();
+        }
         if self.ranked_roots.best() >= self.queue.best() {
             self.ranked_roots.pop().map(Candidate::Root)
         } else {

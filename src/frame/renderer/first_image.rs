@@ -6,7 +6,6 @@ use crate::frame::picture::{Pass, Picture, Studio};
 use crate::frame::shelf::Size;
 use crate::output::Target;
 use crate::scene::{Scene, View};
-use crate::schedule::Kind;
 
 /// Share of a budget that is kept at most, while a first image is drawn, for handing over the image before.
 const MOST_RESERVED: f64 = 0.5;
@@ -36,7 +35,10 @@ impl Renderer {
             if !(work.allowance.begins_image()
                 && self.draw_image(&image, Some(target), is_first, work))
             {
-                self.ladder.note_missed();
+                // That the full resolution does not follow at once says nothing about the one chosen.
+                if image.divisor == divisor && !work.allowance.is_cancelled() {
+                    self.ladder.note_missed();
+                }
                 return;
             }
             is_first = false;
@@ -81,9 +83,10 @@ impl Renderer {
     ) -> Option<Commission> {
         // What is in hand is finished as it was begun, unless something else would be there sooner.
         if let Some((size, view, own_divisor)) = self.shelf.view_in_hand() {
-            let is_asked_for = self.placement.is_up_to_date(scene)
-                && view == self.view(scene, target).reduced(own_divisor);
-            if is_asked_for || own_divisor == divisor {
+            let asked = self.view(scene, target).reduced(own_divisor);
+            let is_asked_for = self.placement.is_up_to_date(scene) && view == asked;
+            let is_alike = [view.width, view.height] == [asked.width, asked.height];
+            if is_asked_for || own_divisor == divisor && is_alike {
                 return Some(Commission {
                     size,
                     view,
@@ -142,7 +145,7 @@ impl Renderer {
         self.shelf.begin(size, view, divisor, frame);
         self.reserve_handing_over(target, work);
 
-        let (handing_over_ms, resolve_ms) = self.ending_ms(&view, divisor, target);
+        let handing_over_ms = self.handing_over_ms(divisor, target);
         let is_shown = self.shelf.shown_size() == Some(size);
         let Work {
             exec,
@@ -166,7 +169,7 @@ impl Renderer {
             return false;
         }
         if is_shown {
-            let has_time = allowance.has_time_for(resolve_ms + handing_over_ms);
+            let has_time = allowance.has_time_for(studio.colouring_ms(&view) + handing_over_ms);
             if !(is_colouring_due || has_time) || !picture.colour(&mut studio, allowance, true) {
                 return false;
             }
@@ -177,22 +180,18 @@ impl Renderer {
                 return false;
             }
         }
+        picture.begin_refinement(&mut studio, allowance);
         self.shelf.publish(size);
         allowance.note_image();
         true
     }
 
-    /// Milliseconds that handing the whole of an image over, and colouring it, will probably not exceed.
-    fn ending_ms(&self, view: &View, divisor: u32, target: Option<&Target<'_>>) -> (f64, f64) {
-        let load = self
-            .load
-            .resolve(self.method, self.world.lights.len(), view);
-        let resolve_ms = self.costs.predict_at_most_ms(Kind::Resolve, load);
-        let handing_over_ms = target.map_or(0.0, |target| {
+    /// Milliseconds that handing the whole of an image over will probably not exceed.
+    fn handing_over_ms(&self, divisor: u32, target: Option<&Target<'_>>) -> f64 {
+        target.map_or(0.0, |target| {
             let size = [target.width(), target.height()];
             load::handing_over_ms(&self.costs, size, divisor) + MARGIN_MS
-        });
-        (handing_over_ms, resolve_ms)
+        })
     }
 
     /// Keeps what handing over the image shown will take.
