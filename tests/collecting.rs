@@ -88,8 +88,8 @@ fn what_the_clock_cuts_short_goes_on_in_the_next_frame_and_comes_to_the_same() {
     let mut whole = Frame::new(SIZE.0, SIZE.1);
     let want = engine(&scene, 1, &ManualClock::default()).render(&scene, budget, &mut whole);
 
-    // Each reading of the clock takes a tenth of a millisecond: a frame of seven has time for one piece.
-    let short = Budget::from_millis(0.7);
+    // Each reading of the clock takes a tenth of a millisecond: a frame of ten has time for a piece or two.
+    let short = Budget::from_millis(1.0);
     let clock = ManualClock::with_step_ns(100_000);
     let mut engine = engine(&scene, 1, &clock);
     let mut frame = Frame::new(SIZE.0, SIZE.1);

@@ -30,7 +30,8 @@ fn refinement_ends_when_the_estimated_error_is_low_enough() {
                 "{method}, {target}: {stats:?}"
             );
             last_units = stats.work_units;
-            if target == 0.25 {
+            // Where only areas are known, the guess stays high to the end.
+            if target == 0.25 && method == Method::Adaptive {
                 assert!(
                     !stats.converged,
                     "{method}: there was more to be done: {stats:?}"
