@@ -21,8 +21,8 @@ const MOST_ROUNDS: u32 = 8;
 /// Refinement of a round, in work units.
 const UNITS: u64 = 400_000;
 
-/// Pixels of the image.
-const SIZE: [u32; 2] = [512, 288];
+/// Pixels of the image: more than fit into the caches of most machines, as those of real frames.
+const SIZE: [u32; 2] = [1280, 720];
 
 /// Curved and flat surfaces, small triangles and large ones.
 const SCENE: &str = "(

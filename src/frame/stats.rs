@@ -49,6 +49,12 @@ impl fmt::Display for Outcome {
     }
 }
 
+/// See [`StageTimes::slowness`].
+const MOST_SLOWNESS: f64 = 3.0;
+
+/// Stages that were predicted to take less say nothing about the machine.
+const LEAST_MS_TO_JUDGE_BY: f64 = 0.1;
+
 /// Milliseconds spent in each stage of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StageTimes {
@@ -81,6 +87,22 @@ impl StageTimes {
             ("resolve", self.resolve),
             ("present", self.present),
         ]
+    }
+
+    /// How many times as long as `predicted` the stages took, at least 1 and at most [`MOST_SLOWNESS`]: a machine that is slow now, as a
+    /// shared one is when a thread has to wait for a processor, will be slow for the rest of the frame.
+    pub(super) fn slowness(&self, predicted: &Self) -> f64 {
+        let [mut measured, mut expected] = [0.0; 2];
+        for ((_, ms), (_, predicted_ms)) in self.entries().into_iter().zip(predicted.entries()) {
+            if predicted_ms > 0.0 {
+                measured += ms;
+                expected += predicted_ms;
+            }
+        }
+        if expected < LEAST_MS_TO_JUDGE_BY {
+            return 1.0;
+        }
+        (measured / expected).clamp(1.0, MOST_SLOWNESS)
     }
 
     /// Adds another frame's times, weighted.

@@ -6,6 +6,7 @@
 
 use super::target::{PIXEL_BYTES, Target};
 use crate::parallel::Exec;
+use crate::simd::dispatch;
 
 /// Largest divisor.
 pub const MOST_DIVISOR: u32 = 4;
@@ -59,42 +60,53 @@ fn enlarge_by<const D: usize>(
                 .neighbours(y / D, height)
                 .map(|y| &small[y * width..][..width]);
             let (pixels, _) = row[..columns * PIXEL_BYTES].as_chunks_mut();
-            fill_row::<D>(a, b, at.weight, pixels);
+            dispatch!(exec.level, _simd => fill_row::<D>(a, b, at.weight, pixels));
         }
     });
 }
 
 /// Fills a row of the target between two rows of the small image.
+#[inline(always)]
 fn fill_row<const D: usize>(a: &[[u8; 4]], b: &[[u8; 4]], weight: u32, row: &mut [[u8; 4]]) {
     let places: [Between; D] = std::array::from_fn(Between::new::<D>);
-    let mut run = [0_u32; RUN + 2];
+    let mut run = [0; RUN + 2];
+    let mut parts = [[0; RUN]; D];
     for (index, out) in row.chunks_mut(RUN * D).enumerate() {
         let first = index * RUN;
         let count = out.len().div_ceil(D);
-        let column = |i: usize| {
-            // One to the left of the first, the edges repeated.
-            let x = (first + i).saturating_sub(1).min(a.len() - 1);
-            mix(u32::from_le_bytes(a[x]), u32::from_le_bytes(b[x]), weight)
-        };
-        if first > 0 && first + count < a.len() {
-            let from = first - 1..first + count + 1;
-            for ((to, a), b) in run.iter_mut().zip(&a[from.clone()]).zip(&b[from]) {
-                *to = mix(u32::from_le_bytes(*a), u32::from_le_bytes(*b), weight);
-            }
-        } else {
-            for (i, to) in run[..count + 2].iter_mut().enumerate() {
-                *to = column(i);
+        blend_rows(a, b, weight, first, &mut run[..count + 2]);
+        // Loops over consecutive pixels, which become vectors.
+        for (part, place) in parts.iter_mut().zip(places) {
+            let skip = usize::from(!place.is_before);
+            let pairs = run[skip..].iter().zip(&run[skip + 1..]);
+            for (to, (&a, &b)) in part[..count].iter_mut().zip(pairs) {
+                *to = mix(a, b, place.weight);
             }
         }
         let (whole, rest) = out.as_chunks_mut::<D>();
-        let behind = whole.len();
         for (i, pixels) in whole.iter_mut().enumerate() {
-            for (pixel, place) in pixels.iter_mut().zip(places) {
-                *pixel = place.between([run[i], run[i + 1], run[i + 2]]);
-            }
+            *pixels = std::array::from_fn(|k| parts[k][i].to_le_bytes());
         }
-        for (pixel, place) in rest.iter_mut().zip(places) {
-            *pixel = place.between([run[behind], run[behind + 1], run[behind + 2]]);
+        for (pixel, part) in rest.iter_mut().zip(&parts) {
+            *pixel = part[count - 1].to_le_bytes();
+        }
+    }
+}
+
+/// Pixels between two rows, from the one before `first` on; at the ends of the rows the outermost are repeated.
+#[inline(always)]
+fn blend_rows(a: &[[u8; 4]], b: &[[u8; 4]], weight: u32, first: usize, out: &mut [u32]) {
+    let blend = |a: [u8; 4], b: [u8; 4]| mix(u32::from_le_bytes(a), u32::from_le_bytes(b), weight);
+    let last = first + out.len() - 2;
+    if first > 0 && last < a.len() {
+        let inside = first - 1..last + 1;
+        for ((to, &a), &b) in out.iter_mut().zip(&a[inside.clone()]).zip(&b[inside]) {
+            *to = blend(a, b);
+        }
+    } else {
+        for (i, to) in out.iter_mut().enumerate() {
+            let x = (first + i).saturating_sub(1).min(a.len() - 1);
+            *to = blend(a[x], b[x]);
         }
     }
 }
@@ -128,17 +140,6 @@ impl Between {
         } else {
             [i, (i + 1).min(len - 1)]
         }
-    }
-
-    /// The colour there, of the pixel's own colour in the middle of its neighbours'.
-    #[inline(always)]
-    fn between(self, [before, own, behind]: [u32; 3]) -> [u8; 4] {
-        let colour = if self.is_before {
-            mix(before, own, self.weight)
-        } else {
-            mix(own, behind, self.weight)
-        };
-        colour.to_le_bytes()
     }
 }
 

@@ -19,7 +19,7 @@ pub const DIVISORS: [u32; 4] = [1, 2, 3, 4];
 const ROOM: f64 = 0.85;
 
 /// Of the budget, what an image may take that is taken without waiting. Predictions are not that far off.
-const DOUBTLESS: f64 = 0.55;
+const DOUBTLESS: f64 = 0.7;
 
 /// Images in a row that a smaller divisor has to fit before it is taken.
 const LEAST_PATIENCE: u32 = 8;

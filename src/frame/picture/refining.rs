@@ -77,7 +77,8 @@ impl Picture {
                 easel.target,
                 false,
             );
-            allowance.reserve_ms(presenting_ms);
+            let slowness = easel.stages.slowness(easel.predicted);
+            allowance.reserve_ms(presenting_ms * slowness);
             let kind = match easel.method {
                 Method::PhongTiles => Kind::Paint,
                 _ => refinement.next_kind(),

@@ -8,7 +8,7 @@ use crate::output::Target;
 use crate::scene::{Scene, View};
 
 /// Share of a budget that is kept at most, while a first image is drawn, for handing over the image before.
-const MOST_RESERVED: f64 = 0.5;
+const MOST_RESERVED: f64 = 0.8;
 
 /// An image to be drawn.
 struct Commission {
@@ -169,13 +169,16 @@ impl Renderer {
             return false;
         }
         if is_shown {
-            let has_time = allowance.has_time_for(studio.colouring_ms(&view) + handing_over_ms);
+            let ending_ms = studio.colouring_ms(&view) + handing_over_ms;
+            let slowness = studio.stages.slowness(studio.predicted);
+            let has_time = allowance.has_time_for(ending_ms * slowness);
             if !(is_colouring_due || has_time) || !picture.colour(&mut studio, allowance, true) {
                 return false;
             }
         } else {
             let is_coloured = picture.colour(&mut studio, allowance, false);
-            let has_time = allowance.has_time_for(handing_over_ms);
+            let slowness = studio.stages.slowness(studio.predicted);
+            let has_time = allowance.has_time_for(handing_over_ms * slowness);
             if !is_coloured || !(is_showing_due || has_time) {
                 return false;
             }
