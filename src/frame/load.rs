@@ -77,8 +77,8 @@ impl ImageLoad {
         }
     }
 
-    /// What the first image of `view` and handing it over to a target of the full size will probably not exceed, given that it is
-    /// drawn at `divisor`.
+    /// What the first image of `view`, and handing it over to a target of the full size, will take, somewhat cautiously, given that it
+    /// is drawn at `divisor`.
     pub(super) fn forecast(
         &self,
         costs: &CostModel,
@@ -88,7 +88,10 @@ impl ImageLoad {
         divisor: u32,
     ) -> Forecast {
         let small = view.reduced(divisor);
-        let ms = |kind, load| costs.predict_at_most_ms(kind, load);
+        // With less caution than where something is late if it takes longer: here a first image goes on in the next frame then.
+        let ms = |kind, load| {
+            0.5 * (costs.predict_ms(kind, load) + costs.predict_at_most_ms(kind, load))
+        };
         let ending_ms = ms(Kind::Resolve, self.resolve(method, lights, &small))
             + handing_over_ms(costs, [view.width, view.height], divisor);
         let whole_ms = ending_ms

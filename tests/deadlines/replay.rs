@@ -130,6 +130,58 @@ fn timed_frames_are_repeated_bit_for_bit_by_other_engines() {
     }
 }
 
+/// A frame that ends while triangles are collected has taken up no candidate, unlike its replay, which collects them all and is
+/// refused the first one.
+#[test]
+fn frames_that_end_while_collecting_are_repeated() {
+    let text =
+        "(lights: [Point(position: (3, -4, 6))], objects: [(shape: Teapot(tessellation: 12))])";
+    let scene = Scene::parse(text, "fine teapot").expect("a valid scene");
+    let render = |engine: &mut Engine, budgets: &[Budget]| {
+        let mut frame = Frame::new(SIZE[0], SIZE[1]);
+        let records: Vec<_> = budgets
+            .iter()
+            .map(|&budget| {
+                let stats = engine.render(&scene, budget, &mut frame);
+                (stats.record, stats.pht, stats.triangles_visible)
+            })
+            .collect();
+        (frame.pixels().to_vec(), records)
+    };
+    let mut cut = 0;
+    for tenths in 10..40 {
+        let clock = CountingClock::stepping(20.0);
+        let known = EngineOptions {
+            costs: Some(CostModel::default()),
+            ..options(Method::Adaptive, 1, clock)
+        };
+        let mut recorded_by = engine(&scene, known);
+        let second = Budget::Millis(f64::from(tenths) * 0.1);
+        let (pixels, records) = render(
+            &mut recorded_by,
+            &[Budget::Millis(0.0), second, Budget::Millis(8.0)],
+        );
+        let phts = records[2].1;
+        cut += u32::from(records[1].0.steps == 0 && (1..phts).contains(&records[1].1));
+        let budgets = [0, 1, 2].map(|i| Budget::Replay(records[i].0));
+        let (got, again) = render(&mut timeless(&scene, Method::Adaptive), &budgets);
+        assert!(records[2].0.steps > 100, "{records:?}");
+        assert_eq!(again[2].0, records[2].0);
+        assert!(got == pixels, "{tenths} tenths, {records:?}");
+    }
+    assert!(cut > 2, "{cut} frames ended while collecting");
+}
+
+/// An error that is not estimated is no reason to stop.
+#[test]
+fn squares_are_shaded_to_the_end_whatever_the_error_asked_for() {
+    let scene = mixed();
+    let mut frame = Frame::new(SIZE[0], SIZE[1]);
+    let mut engine = timeless(&scene, Method::PhongTiles);
+    let stats = engine.render(&scene, Budget::Error(4.0), &mut frame);
+    assert!(stats.converged && stats.phong_pixels > 0, "{stats:?}");
+}
+
 /// It refines first, and then draws everything once.
 #[test]
 fn timed_frames_of_a_backend_that_cannot_repaint_are_repeated_too() {
