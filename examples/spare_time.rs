@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let _cancel = engine.cancel_token();
 
     for number in 0..frames {
-        if number / STRETCH % 2 == 0 {
+        if (number / STRETCH).is_multiple_of(2) {
             turn_camera(&mut scene);
         }
         let due_ms = engine.now_ms() + FRAME_MS;
