@@ -149,17 +149,17 @@ fn frames_that_end_while_collecting_are_repeated() {
         (frame.pixels().to_vec(), records)
     };
     let mut cut = 0;
-    for tenths in 10..40 {
+    for hundredths in 10..100 {
         let clock = CountingClock::stepping(20.0);
         let known = EngineOptions {
             costs: Some(CostModel::default()),
             ..options(Method::Adaptive, 1, clock)
         };
         let mut recorded_by = engine(&scene, known);
-        let second = Budget::Millis(f64::from(tenths) * 0.1);
+        let second = Budget::Millis(f64::from(hundredths) * 0.01);
         let (pixels, records) = render(
             &mut recorded_by,
-            &[Budget::Millis(0.0), second, Budget::Millis(8.0)],
+            &[Budget::Millis(0.0), second, Budget::Millis(20.0)],
         );
         let phts = records[2].1;
         cut += u32::from(records[1].0.steps == 0 && (1..phts).contains(&records[1].1));
@@ -167,9 +167,9 @@ fn frames_that_end_while_collecting_are_repeated() {
         let (got, again) = render(&mut timeless(&scene, Method::Adaptive), &budgets);
         assert!(records[2].0.steps > 100, "{records:?}");
         assert_eq!(again[2].0, records[2].0);
-        assert!(got == pixels, "{tenths} tenths, {records:?}");
+        assert!(got == pixels, "{hundredths} hundredths, {records:?}");
     }
-    assert!(cut > 2, "{cut} frames ended while collecting");
+    assert!(cut > 1, "{cut} frames ended while collecting");
 }
 
 /// An error that is not estimated is no reason to stop.
