@@ -9,12 +9,28 @@ use specula::scene::World;
 use specula::{Budget, Engine, EngineOptions, Frame, Method, Scene};
 use std::collections::HashMap;
 
-const SIZE: (u32, u32) = (240, 160);
+const SIZE: (u32, u32) = (480, 320);
 
-/// Small triangles, and large ones that are shaded part by part.
+/// Small triangles, and large ones that are shaded part by part; enough lights for subdivision to pay.
 const SCENE: &str = r"(
     camera: Perspective(position: (3.0, -7.0, 4.0), target: (0.0, 0.0, 0.7), fov_degrees: 40.0),
-    lights: [Point(position: (4.0, -5.0, 6.0)), Point(position: (-4.0, 3.0, 5.0), intensity: 0.6)],
+    lights: [
+        Point(position: (4.0, -5.0, 6.0), intensity: 0.6), Point(position: (-4.0, 3.0, 5.0), intensity: 0.4),
+        Point(position: (3.0, -6.0, 4.0), intensity: 0.05),
+        Point(position: (1.0, -5.0, 5.0), intensity: 0.05),
+        Point(position: (-1.0, -4.0, 6.0), intensity: 0.05),
+        Point(position: (-3.0, -3.0, 4.0), intensity: 0.05),
+        Point(position: (3.0, -2.0, 5.0), intensity: 0.05),
+        Point(position: (1.0, -6.0, 6.0), intensity: 0.05),
+        Point(position: (-1.0, -5.0, 4.0), intensity: 0.05),
+        Point(position: (-3.0, -4.0, 5.0), intensity: 0.05),
+        Point(position: (3.0, -3.0, 6.0), intensity: 0.05),
+        Point(position: (1.0, -2.0, 4.0), intensity: 0.05),
+        Point(position: (-1.0, -6.0, 5.0), intensity: 0.05),
+        Point(position: (-3.0, -5.0, 6.0), intensity: 0.05),
+        Point(position: (3.0, -4.0, 4.0), intensity: 0.05),
+        Point(position: (1.0, -3.0, 5.0), intensity: 0.05),
+    ],
     objects: [
         (shape: Teapot(tessellation: 3)),
         (shape: Plane(width: 12.0, depth: 12.0, columns: 2, rows: 2)),
