@@ -1,13 +1,15 @@
 //! `specula bench` and `specula inspect`, and the overlay that the latter draws.
 
+mod program;
+
+use program::{specula, text};
 use serde_json::Value;
 use specula::frame::LeafKind;
 use specula::measure::{Layer, ReferenceImage, draw_overlay};
 use specula::scene::World;
 use specula::{Budget, Engine, EngineOptions, Frame, Method, Scene};
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const SIZE: (u32, u32) = (200, 150);
 
@@ -16,22 +18,10 @@ const SCENE: &str = "(objects: [(shape: Teapot())], lights: [Point(position: (3,
 
 // ---- The program ----
 
-fn specula(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_specula"))
-        .args(arguments)
-        .current_dir(directory)
-        .output()
-        .expect("the program starts")
-}
-
 fn workplace() -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("a directory");
     fs::write(directory.path().join("teapot.ron"), SCENE).expect("writable");
     directory
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).expect("UTF-8")
 }
 
 /// The one JSON object on stdout of a run that succeeded.

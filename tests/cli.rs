@@ -1,20 +1,14 @@
 //! The `specula` program from outside: exit status, messages, files and JSON.
 
+mod program;
+
+use program::{specula, text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 const SCENE: &str = "(objects: [(shape: Teapot())])\n";
-
-/// Runs the program in `directory`.
-fn specula(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_specula"))
-        .args(arguments)
-        .current_dir(directory)
-        .output()
-        .expect("the program starts")
-}
 
 /// A directory with a scene in it.
 fn workplace() -> tempfile::TempDir {
@@ -33,10 +27,6 @@ fn files(directory: &Path) -> Vec<String> {
         .collect();
     names.sort();
     names
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).expect("UTF-8")
 }
 
 /// One JSON value for each line of stdout.

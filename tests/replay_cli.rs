@@ -1,18 +1,18 @@
 //! What the program says of timed frames: logs and their replays, errors to stop at, older and smaller images, costs.
 
+mod program;
+
+use program::text;
 use serde_json::Value;
 use specula::schedule::CostModel;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 /// Runs the program in `directory`; words are separated by spaces.
 fn specula(directory: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_specula"))
-        .args(arguments.split_whitespace())
-        .current_dir(directory)
-        .output()
-        .expect("the program starts")
+    let words: Vec<_> = arguments.split_whitespace().collect();
+    program::specula(directory, &words)
 }
 
 /// Renders with options that all runs here share.
@@ -29,10 +29,6 @@ fn workplace() -> tempfile::TempDir {
     write("teapot.ron", "(objects: [(shape: Teapot())])\n");
     write("box.ron", "(objects: [(shape: Box())])\n");
     directory
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).expect("UTF-8")
 }
 
 #[track_caller]

@@ -1,28 +1,24 @@
 //! `specula soak` as its users call it.
 
+mod program;
+
+use program::text;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const SCENE: &str = "(objects: [(shape: Teapot())])\n";
 
 fn specula(directory: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_specula"))
-        .args(arguments.split_whitespace())
-        .current_dir(directory)
-        .output()
-        .expect("the program starts")
+    let words: Vec<_> = arguments.split_whitespace().collect();
+    program::specula(directory, &words)
 }
 
 fn workplace() -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("a directory");
     fs::write(directory.path().join("teapot.ron"), SCENE).expect("writable");
     directory
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).expect("UTF-8")
 }
 
 #[test]

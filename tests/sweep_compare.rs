@@ -1,21 +1,15 @@
 //! `specula sweep` and `specula compare` from outside: the files they write, and what they refuse.
 
+mod program;
+
+use program::{specula, text};
 use serde_json::Value;
 use std::fs;
 use std::io::BufReader;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const SCENE: &str = "(objects: [(shape: Teapot())])\n";
-
-/// Runs the program in `directory`.
-fn specula(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_specula"))
-        .args(arguments)
-        .current_dir(directory)
-        .output()
-        .expect("the program starts")
-}
 
 /// A directory with two scenes in it.
 fn workplace() -> tempfile::TempDir {
@@ -36,10 +30,6 @@ fn files(directory: &Path) -> Vec<String> {
         .collect();
     names.sort();
     names
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).expect("UTF-8")
 }
 
 #[track_caller]

@@ -39,7 +39,7 @@ pub const BOUNDS_LIGHT_NS: f32 = 153.0;
 pub const COLLECT_NS: f32 = 36.0;
 /// See [`COLLECT_NS`].
 pub const COLLECT_LIGHT_NS: f32 = 0.7;
-/// Copying a pixel into the caller's frame, until the engine has measured it: see [`LearnedRate`](super::LearnedRate).
+/// Copying a pixel into the caller's frame, from which the [cost model](super::CostModel) starts.
 pub const PRESENT_PIXEL_NS: f32 = 0.4;
 
 /// Drawing a first image: a part for each triangle of the scene, whether it is seen or not.

@@ -11,6 +11,8 @@
 //!   counts at once.
 //! * When **no** divisor helps, because triangles and not pixels take the time, the image is drawn over several frames, at the smallest
 //!   divisor that at least its last steps fit with, which cannot be interrupted.
+//!
+//! The ladder is asked in every frame that has a first image to draw; one drawn over several frames counts in each of them.
 
 /// Divisors of the image's sides, the full resolution first.
 pub const DIVISORS: [u32; 4] = [1, 2, 3, 4];
