@@ -6,7 +6,7 @@
 
 use specula::backend::software::SoftwareBackend;
 use specula::backend::{Backend, BasePaint, Fill, Geometry, Patch};
-use specula::geometry::{Bary, Vec3s};
+use specula::geometry::{Bary, Quadratic, Vec3s};
 use specula::highlight::{SignBits, compute_signs, light_masks};
 use specula::illumination::{ActiveLights, PointBatch, shade_vertices};
 use specula::parallel::Exec;
@@ -304,7 +304,7 @@ impl Bench {
         } else {
             Fill::Phong {
                 lights,
-                remainder: [[0.0; 3]; 3],
+                remainder: Quadratic::default(),
             }
         };
         let whole = |&triangle: &u32| Patch {

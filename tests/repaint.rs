@@ -4,7 +4,7 @@ mod support;
 
 use specula::backend::software::{NO_TRIANGLE, SoftwareBackend};
 use specula::backend::{Backend, BasePaint, Fill, Geometry, Patch};
-use specula::geometry::{Bary, Vec3s};
+use specula::geometry::{Bary, Quadratic, Vec3s};
 use specula::illumination::ActiveLights;
 use specula::output::Frame;
 use specula::parallel::Exec;
@@ -303,7 +303,7 @@ fn phong_on_whole_triangles_is_the_phong_image_to_the_last_bit() {
         let geometry = geometry(&world, &view, std::slice::from_ref(&all));
         let fill = Fill::Phong {
             lights: ActiveLights::all(world.lights.len()),
-            remainder: [[0.0; 3]; 3],
+            remainder: Quadratic::default(),
         };
         for exec in levels() {
             let mut backend = SoftwareBackend::new();
@@ -362,7 +362,7 @@ fn without_lights_ambient_and_the_remainder_are_left() {
     draw_black(&mut backend, best(), geometry);
     let fill = Fill::Phong {
         lights: ActiveLights::default(),
-        remainder,
+        remainder: Quadratic::linear(remainder),
     };
     let mut patches = [Patch {
         triangle: 0,
@@ -478,7 +478,7 @@ fn levels_with_fused_multiply_add_paint_the_same() {
                 if random.below(2) == 0 {
                     patch.fill = Fill::Phong {
                         lights,
-                        remainder: corners,
+                        remainder: Quadratic::linear(corners),
                     };
                 }
                 parts.push(patch);

@@ -25,7 +25,7 @@ pub mod suite;
 
 pub use kind::BackendKind;
 
-use crate::geometry::{Bary, Vec3s};
+use crate::geometry::{Bary, Quadratic, Vec3s};
 use crate::illumination::ActiveLights;
 pub use crate::output::Interpolation;
 use crate::output::{Rect, Target};
@@ -154,8 +154,8 @@ pub enum Fill {
     Phong {
         /// Terms that are evaluated, besides ambient light.
         lights: ActiveLights,
-        /// What to add, interpolated between the corners of the *whole* triangle: the share of all other terms.
-        remainder: [[f32; 3]; 3],
+        /// What to add, over the *whole* triangle: the share of all other terms.
+        remainder: Quadratic,
     },
 }
 

@@ -7,6 +7,7 @@ pub mod import;
 mod mesh;
 pub mod normals;
 pub mod polygon;
+pub mod quadratic;
 pub mod screen;
 pub mod shapes;
 pub mod topology;
@@ -15,6 +16,7 @@ pub mod viewport;
 pub use bary::Bary;
 pub use clusters::{Cluster, build_clusters};
 pub use mesh::{Mesh, MeshError};
+pub use quadratic::Quadratic;
 pub use topology::Topology;
 
 /// Many three-component vectors, one array per component, ready for SIMD lanes.

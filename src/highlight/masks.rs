@@ -37,6 +37,8 @@ pub enum Verdict {
 pub struct TriangleLights {
     /// The terms; all others may be interpolated between the corners.
     pub active: ActiveLights,
+    /// Those of them that no smooth function follows: highlights, and diffuse terms of lights that set on the triangle.
+    pub rough: ActiveLights,
     /// The same in one word.
     pub verdict: Verdict,
 }
@@ -119,13 +121,15 @@ fn masks_with_room<const ROOM: usize>(
         };
         let specular = Term::new(index, true, shares(1, bound.specular.deviation));
         let mut diffuse = Term::new(index, false, shares(0, bound.diffuse.deviation));
+        diffuse.is_rough = bound.diffuse.lo <= 0.0;
         // Where the specular term is evaluated the diffuse one costs next to nothing: it comes after.
         diffuse.order = diffuse.order.max(specular.order);
         *pair = [specular, diffuse];
     }
-    let active = spend(terms[..lights.len()].as_flattened_mut());
+    let [active, rough] = spend(terms[..lights.len()].as_flattened_mut());
     TriangleLights {
         active,
+        rough,
         verdict: if active.diffuse.is_empty() {
             Verdict::Absent
         } else {
@@ -145,6 +149,8 @@ fn amplitudes(material: &ShadingMaterial, light: &ShadingLight, channel: usize) 
 struct Term {
     light: usize,
     specular: bool,
+    /// Whether it belongs to [`TriangleLights::rough`] if it is active.
+    is_rough: bool,
     /// Of the budget of each channel.
     shares: [f64; 3],
     order: f64,
@@ -155,37 +161,54 @@ impl Term {
         Self {
             light,
             specular,
+            is_rough: specular,
             shares,
             order: shares[0].max(shares[1]).max(shares[2]),
         }
     }
 }
 
-/// Skips terms until the budget of a channel is spent; the rest is active.
-fn spend(terms: &mut [Term]) -> ActiveLights {
+/// Skips terms until the budget of a channel is spent; the rest is active. And the same as if there were only rough terms.
+fn spend(terms: &mut [Term]) -> [ActiveLights; 2] {
     // Stable order: a light's specular term stays before its diffuse one.
     let key = |term: &Term| (term.order, term.light, !term.specular);
     terms.sort_unstable_by(|a, b| {
         let (a, b) = (key(a), key(b));
         a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2)))
     });
-    let mut active = ActiveLights::default();
-    let mut spent = [0.0; 3];
+    let [mut all, mut rough] = [Spending::default(); 2];
     for term in terms {
-        if active.specular.contains(term.light) {
-            continue;
-        }
-        let after: [f64; 3] = std::array::from_fn(|i| spent[i] + term.shares[i]);
-        if after.iter().all(|&sum| sum <= 1.0) {
-            spent = after;
-            continue;
-        }
-        active.diffuse.insert(term.light);
-        if term.specular {
-            active.specular.insert(term.light);
+        all.take(term);
+        if term.is_rough {
+            rough.take(term);
         }
     }
-    active
+    [all.active, rough.active]
+}
+
+/// How much of the budget has been spent, and what did not fit in.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spending {
+    active: ActiveLights,
+    spent: [f64; 3],
+}
+
+impl Spending {
+    /// Skips a term if the budget allows that. Not the diffuse term of a light whose specular one is active.
+    fn take(&mut self, term: &Term) {
+        if self.active.specular.contains(term.light) {
+            return;
+        }
+        let after: [f64; 3] = std::array::from_fn(|i| self.spent[i] + term.shares[i]);
+        if after.iter().all(|&sum| sum <= 1.0) {
+            self.spent = after;
+            return;
+        }
+        self.active.diffuse.insert(term.light);
+        if term.specular {
+            self.active.specular.insert(term.light);
+        }
+    }
 }
 
 /// How much linear light may be added to a channel that is at least `lo`: half a code at the slope there.

@@ -11,5 +11,5 @@ pub mod vertices;
 pub use batch::{shade_points, shade_vertices};
 pub use lanes::{ShadingKit, shade_lanes};
 pub use lights::{ActiveLights, LightMask, MAX_LIGHTS};
-pub use points::{PointBatch, shade_corners};
+pub use points::{PointBatch, shade_few};
 pub use vertices::VertexSet;

@@ -138,38 +138,46 @@ impl PointBatch {
     }
 }
 
-/// Linear colours of a triangle's corners under some of the lights.
+/// Linear colours of a few points under some of the lights.
 #[must_use]
-pub fn shade_corners(
+pub fn shade_few<const N: usize>(
     level: Level,
     kit: &ShadingKit<'_>,
     active: &ActiveLights,
-    points: [[f32; 3]; 3],
-    normals: [[f32; 3]; 3],
-) -> [[f32; 3]; 3] {
-    dispatch!(level, simd => shade_corners_lanes(simd, kit, active, points, normals))
+    points: &[[f32; 3]; N],
+    normals: &[[f32; 3]; N],
+) -> [[f32; 3]; N] {
+    dispatch!(level, simd => shade_few_lanes(simd, kit, active, points, normals))
 }
 
 #[inline(always)]
-fn shade_corners_lanes<S: Simd>(
+fn shade_few_lanes<S: Simd, const N: usize>(
     simd: S,
     kit: &ShadingKit<'_>,
     active: &ActiveLights,
-    points: [[f32; 3]; 3],
-    normals: [[f32; 3]; 3],
-) -> [[f32; 3]; 3] {
-    let (points, normals) = (corner_lanes(simd, points), corner_lanes(simd, normals));
-    let [r, g, b] = shade_lanes(simd, kit, active, points, normals);
-    [[r[0], g[0], b[0]], [r[1], g[1], b[1]], [r[2], g[2], b[2]]]
+    points: &[[f32; 3]; N],
+    normals: &[[f32; 3]; N],
+) -> [[f32; 3]; N] {
+    let mut colours = [[0.0; 3]; N];
+    for first in (0..N).step_by(S::f32s::LEN) {
+        let point = few_lanes(simd, points, first);
+        let normal = few_lanes(simd, normals, first);
+        let [r, g, b] = shade_lanes(simd, kit, active, point, normal);
+        for (lane, colour) in colours[first..].iter_mut().take(S::f32s::LEN).enumerate() {
+            *colour = [r[lane], g[lane], b[lane]];
+        }
+    }
+    colours
 }
 
-/// Three vectors in lanes; spare lanes repeat the last.
+/// The vectors from `first` on, in lanes; spare lanes repeat the last.
 #[inline(always)]
-fn corner_lanes<S: Simd>(simd: S, v: [[f32; 3]; 3]) -> [S::f32s; 3] {
+fn few_lanes<S: Simd, const N: usize>(simd: S, v: &[[f32; 3]; N], first: usize) -> [S::f32s; 3] {
+    let last = N - 1;
     [
-        S::f32s::from_fn(simd, |lane| v[lane.min(2)][0]),
-        S::f32s::from_fn(simd, |lane| v[lane.min(2)][1]),
-        S::f32s::from_fn(simd, |lane| v[lane.min(2)][2]),
+        S::f32s::from_fn(simd, |lane| v[(first + lane).min(last)][0]),
+        S::f32s::from_fn(simd, |lane| v[(first + lane).min(last)][1]),
+        S::f32s::from_fn(simd, |lane| v[(first + lane).min(last)][2]),
     ]
 }
 

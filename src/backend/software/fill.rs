@@ -1,7 +1,7 @@
 //! The colours of a patch's pixels: interpolated, or from the illumination equation.
 
-use super::lanes::{Corners3, Lanes3, interpolate};
-use crate::geometry::Bary;
+use super::lanes::{Corners3, Lanes3, interpolate, splat3};
+use crate::geometry::{Bary, Quadratic};
 use crate::illumination::{ActiveLights, ShadingKit, shade_lanes};
 use crate::simd::Simd;
 use fearless_simd::{SimdBase, SimdFloat};
@@ -64,7 +64,7 @@ impl PatchFill for GouraudFill {
     }
 }
 
-/// The illumination equation under some lights, and an interpolated rest.
+/// The illumination equation under some lights, and the rest as a quadratic.
 pub(super) struct PhongFill<'a> {
     /// Viewer, material and lights.
     pub kit: ShadingKit<'a>,
@@ -74,8 +74,25 @@ pub(super) struct PhongFill<'a> {
     pub positions: Corners3,
     /// Of the root's corners.
     pub normals: Corners3,
-    /// What to add, at the root's corners.
-    pub remainder: Corners3,
+    /// What to add, over the root.
+    pub remainder: Quadratic,
+}
+
+/// The value of a quadratic, whose bulges are left out where there are none.
+#[inline(always)]
+fn quadratic<S: Simd>(simd: S, w: Lanes3<S>, q: &Quadratic) -> Lanes3<S> {
+    let mut out = interpolate(simd, w, &q.corners);
+    if q.is_linear() {
+        return out;
+    }
+    let four = S::f32s::splat(simd, 4.0);
+    let [a, b, c] = [w[0] * four, w[1] * four, w[2] * four];
+    let bulges = [a * w[1], b * w[2], c * w[0]];
+    for (i, out) in out.iter_mut().enumerate() {
+        let [a, b, c] = splat3(simd, [q.surplus[0][i], q.surplus[1][i], q.surplus[2][i]]);
+        *out = bulges[2].mul_add(c, bulges[1].mul_add(b, bulges[0].mul_add(a, *out)));
+    }
+    out
 }
 
 impl PatchFill for PhongFill<'_> {
@@ -84,7 +101,7 @@ impl PatchFill for PhongFill<'_> {
         let point = interpolate(simd, w, &self.positions);
         let normal = interpolate(simd, w, &self.normals);
         let shaded = shade_lanes(simd, &self.kit, &self.lights, point, normal);
-        let rest = interpolate(simd, w, &self.remainder);
+        let rest = quadratic(simd, w, &self.remainder);
         [
             shaded[0] + rest[0],
             shaded[1] + rest[1],

@@ -4,7 +4,8 @@
 //! [not painted](Leaf::is_painted) yet, because the budget ended first, still show what they were divided from.
 
 use super::parts::PartState;
-use super::{Progress, Refinement, Root, Shading};
+use super::shading::{Shade, ShadeKind, Shading};
+use super::{Progress, Refinement, Root};
 use crate::backend::Backend;
 use crate::frame::Method;
 use crate::frame::base::BaseImage;
@@ -19,6 +20,9 @@ pub enum LeafKind {
     Interpolated,
     /// The illumination equation is evaluated at every pixel.
     PerPixel,
+    /// Its highlights, and lights that set on it, are evaluated at every pixel; the rest is interpolated as a quadratic. It may be shaded
+    /// per pixel later.
+    Highlights,
     /// Colours are interpolated between the corners, which is proved to be right.
     Proved,
 }
@@ -109,8 +113,8 @@ impl Refinement {
                 ..Leaf::root(root.triangle, colours, root.pixels)
             };
             if root.progress == Progress::Done {
-                let last_paint = self.root_shading(root).map_or(0, |s| s.last_paint);
-                self.shade(&mut leaf, root, last_paint);
+                let shade = self.root_shading(root).map(|known| known.shade);
+                self.shade(&mut leaf, root, shade.unwrap_or_default());
             }
             f(&leaf);
         }
@@ -135,7 +139,7 @@ impl Refinement {
             match part.state {
                 PartState::Cut => continue,
                 PartState::Waiting => {}
-                PartState::Shaded { last_paint } => self.shade(&mut leaf, root, last_paint),
+                PartState::Shaded(shade) => self.shade(&mut leaf, root, shade),
             }
             f(&leaf);
         }
@@ -148,14 +152,12 @@ impl Refinement {
         id: LeafId,
         leaf: &refine::Leaf,
     ) -> Leaf {
-        let last_paint = self
-            .progressing
-            .get(id as usize)
-            .map_or(0, |p| p.last_paint);
+        let progress = self.progressing.get(id as usize);
+        let shade = progress.map_or_else(Shade::default, |p| p.shade);
         let mut drawn = Leaf {
             corners: leaf.corners,
             level: level(leaf.corners),
-            is_painted: self.is_painted(last_paint),
+            is_painted: self.is_painted(shade.last_paint),
             is_pht: root.is_pht,
             ..Leaf::root(
                 leaf.triangle,
@@ -165,17 +167,21 @@ impl Refinement {
         };
         // One without pixels was closed when it was painted.
         if leaf.state == LeafState::Closed && leaf.pixels > 0 {
-            self.shade(&mut drawn, root, last_paint);
+            self.shade(&mut drawn, root, shade);
         }
         drawn
     }
 
     /// Makes it a leaf that is shaded as its root is shaded.
-    fn shade(&self, leaf: &mut Leaf, root: &Root, last_paint: u32) {
+    fn shade(&self, leaf: &mut Leaf, root: &Root, shade: Shade) {
         match self.root_shading(root).map(|s| s.shading) {
             Some(Shading::PerPixel(..)) => {
-                leaf.kind = LeafKind::PerPixel;
-                leaf.is_painted = self.is_painted(last_paint);
+                let (kind, is_painted) = self.shade_shown(shade);
+                leaf.kind = match kind {
+                    ShadeKind::Exact => LeafKind::PerPixel,
+                    ShadeKind::FirstStep => LeafKind::Highlights,
+                };
+                leaf.is_painted = is_painted;
             }
             // It keeps the colours it has.
             Some(Shading::Proved) => leaf.kind = LeafKind::Proved,
@@ -195,7 +201,7 @@ impl Refinement {
     }
 
     /// Whether the patch of that number, counted from 1, is off the list; 0 for what needed none.
-    fn is_painted(&self, last_paint: u32) -> bool {
+    pub(super) fn is_painted(&self, last_paint: u32) -> bool {
         last_paint as usize + self.paints.len() <= self.enqueued as usize || last_paint == 0
     }
 }

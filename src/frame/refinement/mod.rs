@@ -25,12 +25,12 @@ mod parts;
 mod places;
 mod planning;
 mod ranking;
+mod shading;
 
 use super::Method;
 use super::base::BaseImage;
 use super::stats::FrameStats;
 use crate::backend::{Backend, Patch};
-use crate::illumination::ActiveLights;
 use crate::parallel::Exec;
 use crate::refine::estimate::{SAMPLES_AT_ONCE, Samples};
 use crate::refine::{FIRST_LEAVES, Forest, LeafId, SplitOutcome};
@@ -43,6 +43,7 @@ pub use leaves::{Leaf, LeafKind};
 use memory::Memory;
 use parts::Part;
 use places::Places;
+use shading::{Polish, RootShading, Shade};
 use std::collections::VecDeque;
 
 /// Nominal nanoseconds of a piece.
@@ -79,6 +80,8 @@ enum Candidate {
     Leaf(LeafId),
     /// A part of a leaf, by its place in [`Refinement::parts`].
     Part(u32),
+    /// The second step of shading, by its place in [`Refinement::polishes`].
+    Polish(u32),
 }
 
 /// A visible triangle. There may be a million, few of which are ever looked at: what is known of those only is kept elsewhere.
@@ -131,28 +134,13 @@ enum Progress {
     Done,
 }
 
-/// Which terms have to be evaluated at the pixels of a root.
-#[derive(Clone, Copy, Debug)]
-enum Shading {
-    /// None: interpolation is proved to be right.
-    Proved,
-    /// These, plus the rest, interpolated between the triangle's corners.
-    PerPixel(ActiveLights, [[f32; 3]; 3]),
-}
-
-/// What is known of a root that is shaded per pixel, or that bounds have been found for.
-#[derive(Clone, Copy, Debug)]
-struct RootShading {
-    shading: Shading,
-    /// Number of the last patch that shades it as a whole; see [`Refinement::enqueued`].
-    last_paint: u32,
-}
-
 /// Who waits for a patch to be painted.
 #[derive(Clone, Copy, Debug)]
 enum Owner {
-    /// Nobody: its pixels are right then.
+    /// Nobody: it is shaded then.
     Nobody,
+    /// Nobody, and its pixels were shaded before.
+    Polish,
     /// A leaf, which then becomes a candidate for the next step.
     Leaf(LeafId),
 }
@@ -172,8 +160,8 @@ struct Paint {
 struct Progressing {
     patches: u32,
     pixels: u32,
-    /// Number of its last patch; see [`Refinement::enqueued`].
-    last_paint: u32,
+    /// Its last patch, and what comes after it.
+    shade: Shade,
     /// Its parts have taken its place.
     is_cut: bool,
 }
@@ -203,6 +191,7 @@ pub(super) struct Refinement {
     /// How many patches were put on the list so far, which numbers them from 1.
     enqueued: u32,
     parts: Vec<Part>,
+    polishes: Vec<Polish>,
     /// How many of `parts` have been ranked; the samples of the others are still to be evaluated.
     ranked_parts: usize,
     /// Triangles are shaded per pixel in the order of their area ([`Method::PhongArea`]).
@@ -260,6 +249,7 @@ impl Refinement {
         self.planned_units = 0;
         self.progressing.clear();
         self.parts.clear();
+        self.polishes.clear();
         self.samples.clear();
         self.ranked_parts = 0;
         self.commits = 0;
@@ -288,6 +278,7 @@ impl Refinement {
         self.samples.reserve(SAMPLES_AT_ONCE);
         self.queue.reserve(ENTRIES_AT_ONCE);
         self.shadings.reserve(FIRST_SHADINGS);
+        self.polishes.reserve(FIRST_SHADINGS);
         self.progressing.reserve(FIRST_LEAVES);
         self.piece.clear();
         self.piece.reserve(ENTRIES_AT_ONCE);

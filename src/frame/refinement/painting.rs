@@ -47,7 +47,8 @@ impl Refinement {
         allowance.spend(units);
         for index in 0..self.piece.len() {
             let patch = self.piece[index];
-            if matches!(patch.fill, Fill::Phong { .. }) {
+            let is_polish = matches!(self.owners[index], Owner::Polish);
+            if matches!(patch.fill, Fill::Phong { .. }) && !is_polish {
                 self.counters.phong_pixels += u64::from(patch.pixels);
             }
             if let Owner::Leaf(leaf) = self.owners[index] {
@@ -102,7 +103,7 @@ impl Refinement {
         if let Owner::Leaf(leaf) = owner {
             let progress = self.leaf_progress(leaf);
             progress.patches += 1;
-            progress.last_paint = number;
+            progress.shade.last_paint = number;
         }
         self.paints.push_back(Paint {
             patch,

@@ -6,8 +6,8 @@
 //! it is shaded, a part keeps the leaf's interpolated colours, and the leaf's edges are
 //! [pinned](crate::refine::Forest::pin), so that there is no seam to its neighbours.
 
-use super::{Candidate, Owner, Refinement, Shading, Stage, ranking};
-use crate::backend::{Fill, Patch};
+use super::shading::Shade;
+use super::{Candidate, Refinement, Stage, ranking};
 use crate::geometry::bary::{self, Bary, blend};
 use crate::refine::LeafId;
 use crate::schedule::cost;
@@ -51,10 +51,7 @@ pub(super) enum PartState {
     /// Smaller parts have taken its place.
     Cut,
     /// It is on the list to be shaded, if it needs to be, or was shaded.
-    Shaded {
-        /// Number of its last patch; see [`Refinement::enqueued`].
-        last_paint: u32,
-    },
+    Shaded(Shade),
 }
 
 impl Part {
@@ -110,9 +107,8 @@ impl Refinement {
             self.leaf_progress(part.leaf).patches += parts;
             self.parts[index as usize].state = PartState::Cut;
         } else {
-            self.shade_part(stage, &part, triangle);
-            let last_paint = self.enqueued;
-            self.parts[index as usize].state = PartState::Shaded { last_paint };
+            let shade = self.shade_part(stage, &part, triangle);
+            self.parts[index as usize].state = PartState::Shaded(shade);
         }
         let progress = self.leaf_progress(part.leaf);
         progress.patches -= 1;
@@ -201,24 +197,17 @@ impl Refinement {
         self.root_of(self.forest.leaf(leaf).triangle)
     }
 
-    fn shade_part(&mut self, stage: &Stage<'_>, part: &Part, triangle: u32) {
-        if let Some(root) = self.root_of(triangle)
-            && let Shading::PerPixel(lights, remainder) = self.shading(stage, root)
-        {
-            self.mark_refined(root, false);
-            let patch = Patch {
-                triangle,
-                corners: part.piece.corners,
-                fill: Fill::Phong { lights, remainder },
-                pixels: 0,
-            };
-            self.enqueue(Owner::Nobody, patch, part.pixels, part.mass());
-        }
+    fn shade_part(&mut self, stage: &Stage<'_>, part: &Part, triangle: u32) -> Shade {
+        let root = self.root_of(triangle);
+        root.map_or_else(Shade::default, |root| {
+            let corners = part.piece.corners;
+            self.shade_patch(stage, root, corners, part.pixels, part.mass())
+        })
     }
 }
 
 /// The centroids of a triangle's quarters.
-const SAMPLE_WEIGHTS: [[f32; 3]; SAMPLES_PER_PART] = [
+pub(super) const SAMPLE_WEIGHTS: [[f32; 3]; SAMPLES_PER_PART] = [
     [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
     [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
     [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],

@@ -2,11 +2,9 @@
 
 use super::parts;
 use super::ranking::{self, Action};
-use super::{Candidate, Owner, Progress, Refinement, Root, RootShading, Shading, Stage};
+use super::shading::{bounds_pay, usual_lights};
+use super::{Candidate, Owner, Progress, Refinement, Stage};
 use crate::backend::{Fill, Patch};
-use crate::geometry::Bary;
-use crate::highlight;
-use crate::illumination::{self, ActiveLights, ShadingKit};
 use crate::refine::{LeafId, LeafState, PlanOutcome, SplitOutcome};
 use crate::schedule::{Allowance, cost};
 
@@ -92,14 +90,14 @@ impl Refinement {
                 let is_open = self.forest.leaf(leaf).state == LeafState::Open;
                 is_open.then(|| self.choose(stage, leaf).1)
             }
-            Candidate::Part(_) => Some(Action::Shade),
+            Candidate::Part(_) | Candidate::Polish(_) => Some(Action::Shade),
         }
     }
 
     fn planning_cost(&self, stage: &Stage<'_>, candidate: Candidate, action: Action) -> u64 {
         let lights = stage.world.lights.len();
         let units = match (candidate, action) {
-            (Candidate::Root(_), Action::Shade) => cost::LIST_NS,
+            (Candidate::Root(_), Action::Shade) | (Candidate::Polish(_), _) => cost::LIST_NS,
             (Candidate::Root(index), Action::Split(_)) => {
                 let pixels = self.roots[index as usize].pixels;
                 self.root_ranking(lights).planting_cost(pixels)
@@ -123,6 +121,10 @@ impl Refinement {
             Candidate::Root(index) => (self.roots[index as usize].pixels as f32, true),
             Candidate::Leaf(leaf) => (self.forest.leaf(leaf).pixels as f32, false),
             Candidate::Part(part) => (self.parts[part as usize].pixels, false),
+            Candidate::Polish(number) => {
+                let pixels = self.polishes[number as usize].pixels;
+                return cost::phong(pixels, stage.world.lights.len());
+            }
         };
         match action {
             // It is only looked at.
@@ -132,7 +134,7 @@ impl Refinement {
                 let edges = marks.count_ones() as f32;
                 cost::repaint(edges + 1.0, pixels * (1.0 + 0.5 * edges))
             }
-            Action::Shade => cost::phong(pixels, stage.world.lights.len()),
+            Action::Shade => cost::phong(pixels, usual_lights(stage.world.lights.len())),
         }
     }
 
@@ -145,6 +147,7 @@ impl Refinement {
             Candidate::Root(index) => Some(index),
             Candidate::Leaf(leaf) => self.root_of(self.forest.leaf(leaf).triangle),
             Candidate::Part(part) => self.root_of_part(part),
+            Candidate::Polish(_) => None,
         };
         let root = root.map(|index| self.roots[index as usize]);
         match root {
@@ -161,6 +164,7 @@ impl Refinement {
             Candidate::Root(index) => self.plan_root(stage, index, action),
             Candidate::Leaf(leaf) => self.plan_leaf(stage, leaf, action),
             Candidate::Part(part) => self.plan_part(stage, part),
+            Candidate::Polish(number) => self.plan_polish(stage, number),
         }
     }
 
@@ -291,89 +295,12 @@ impl Refinement {
         }
     }
 
-    /// Has all pixels of a root shaded.
-    fn shade_root(&mut self, stage: &Stage<'_>, index: u32) {
-        let root = self.roots[index as usize];
-        self.roots[index as usize].progress = Progress::Done;
-        self.error_mass -= root.mass();
-        self.shade_patch(stage, index, Bary::ROOT, root.pixels, root.mass());
-        let place = self.roots[index as usize].shading as usize;
-        if let Some(shading) = self.shadings.get_mut(place) {
-            shading.last_paint = self.enqueued;
-        }
-    }
-
-    /// Has the pixels of a leaf shaded.
-    fn shade_leaf(&mut self, stage: &Stage<'_>, id: LeafId) {
-        let mass = self.leaf_mass(id);
-        self.error_mass -= mass;
-        self.forest.close(stage.world, id);
-        let leaf = self.forest.leaf(id);
-        let (corners, pixels) = (leaf.corners, leaf.pixels);
-        if let Some(index) = self.root_of(leaf.triangle) {
-            self.shade_patch(stage, index, corners, pixels, mass);
-            self.leaf_progress(id).last_paint = self.enqueued;
-        }
-    }
-
-    fn shade_patch(
-        &mut self,
-        stage: &Stage<'_>,
-        index: u32,
-        corners: [Bary; 3],
-        pixels: u32,
-        mass: f64,
-    ) {
-        let Shading::PerPixel(lights, remainder) = self.shading(stage, index) else {
-            return;
-        };
-        self.mark_refined(index, false);
-        let patch = Patch {
-            triangle: self.roots[index as usize].triangle,
-            corners,
-            fill: Fill::Phong { lights, remainder },
-            pixels: 0,
-        };
-        self.enqueue(Owner::Nobody, patch, pixels as f32, mass);
-    }
-
-    /// Which terms the pixels of a root need: by its bounds, if finding those costs less than they may save.
-    pub(super) fn shading(&mut self, stage: &Stage<'_>, index: u32) -> Shading {
-        let root = self.roots[index as usize];
-        if let Some(known) = self.root_shading(&root) {
-            return known.shading;
-        }
-        let count = stage.world.lights.len();
-        let shading = if self.by_area || !bounds_pay(&root, stage) {
-            Shading::PerPixel(ActiveLights::all(count), [[0.0; 3]; 3])
-        } else {
-            self.units_for_bounds += cost::bounds(count) as u64;
-            let view = stage.view;
-            let bounds =
-                highlight::light_masks(stage.world, &view.eye, view.encoding, root.triangle);
-            let evaluated = bounds.active.diffuse.len() + bounds.active.specular.len();
-            self.counters.light_terms += (2 * count - evaluated) as u64;
-            if bounds.verdict == highlight::Verdict::Absent {
-                self.counters.proved += 1;
-                Shading::Proved
-            } else {
-                let remainder = remainder(stage, root.triangle, &bounds.active);
-                Shading::PerPixel(bounds.active, remainder)
-            }
-        };
-        self.roots[index as usize].shading = self.shadings.len() as u32;
-        self.shadings.push(RootShading {
-            shading,
-            last_paint: 0,
-        });
-        shading
-    }
-
     /// Ranks a candidate and puts it on the queue.
     fn offer(&mut self, stage: &Stage<'_>, candidate: Candidate) {
         match candidate {
             Candidate::Leaf(leaf) => self.offer_leaf(stage, leaf),
             Candidate::Part(part) => self.offer_part(stage, part),
+            Candidate::Polish(number) => self.offer_polish(number),
             Candidate::Root(index) => {
                 let root = self.roots[index as usize];
                 let (rank, _) = self.root_ranking(stage.world.lights.len()).choose(&root);
@@ -401,26 +328,4 @@ impl Refinement {
         let rank = self.choose(stage, leaf).0;
         self.queue.push(rank, Candidate::Leaf(leaf));
     }
-}
-
-/// Whether finding out which lights a root needs may save more than it costs: perhaps half of them can be left out.
-fn bounds_pay(root: &Root, stage: &Stage<'_>) -> bool {
-    let lights = stage.world.lights.len();
-    cost::light_saved(root.pixels as f32) * lights as f32 * 0.5 >= cost::bounds(lights)
-}
-
-/// What the colours of a triangle's corners owe to terms that are not evaluated per pixel.
-fn remainder(stage: &Stage<'_>, triangle: u32, active: &ActiveLights) -> [[f32; 3]; 3] {
-    let world = stage.world;
-    let corners = world.triangles[triangle as usize].map(|v| v as usize);
-    let material = &world.materials[usize::from(world.triangle_material[triangle as usize])];
-    let evaluated = illumination::shade_corners(
-        stage.exec.level,
-        &ShadingKit::new(stage.view.eye, material, &world.lights),
-        active,
-        corners.map(|v| world.positions.get(v)),
-        corners.map(|v| world.normals.get(v)),
-    );
-    let full = corners.map(|v| stage.base.colours().get(v));
-    std::array::from_fn(|i| std::array::from_fn(|k| full[i][k] - evaluated[i][k]))
 }

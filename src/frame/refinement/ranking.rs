@@ -10,7 +10,8 @@
 
 use super::drawn_once;
 use super::parts::{self, CUT, SAMPLES_PER_PART};
-use super::{Refinement, Root, Shading, Stage};
+use super::shading::{Shading, usual_lights};
+use super::{Refinement, Root, Stage};
 use crate::output::Encoding;
 use crate::refine::{Forest, LeafId};
 use crate::schedule::cost;
@@ -50,6 +51,19 @@ pub(super) fn lightness(encoding: Encoding, [r, g, b]: [f32; 3]) -> f32 {
             Encoding::Srgb => light.sqrt(),
             Encoding::Linear => light,
         }
+}
+
+/// The square of a small difference of two linear colours, in squared codes and as a mean over the channels, one of them being `colour`.
+pub(super) fn squared_codes(encoding: Encoding, colour: [f32; 3], difference: [f32; 3]) -> f32 {
+    let squares = (0..3).map(|channel| {
+        let slope = match encoding {
+            // That of the square root, as above, and not of black.
+            Encoding::Srgb => 127.5 / colour[channel].clamp(0.002, 1.0).sqrt(),
+            Encoding::Linear => 255.0,
+        };
+        (slope * difference[channel]).powi(2)
+    });
+    squares.sum::<f32>() / 3.0
 }
 
 /// First guess of a triangle's mean squared error, of which only the lightness of its corners is known: shading that changes by so many
@@ -122,7 +136,7 @@ impl RootRanking<'_> {
         let shade = if self.is_drawn_once {
             0.0
         } else {
-            benefit / cost::phong(pixels, self.lights)
+            benefit / cost::phong(pixels, usual_lights(self.lights))
         };
         let planting = self.planting_cost(root.pixels);
         let splitting = planting + split_cost(pixels, 3, self.lights);
@@ -228,8 +242,8 @@ impl Refinement {
         let root = self.root_of(triangle).map(|i| self.roots[i as usize]);
         match root.and_then(|root| self.root_shading(&root).map(|s| s.shading)) {
             Some(Shading::Proved) => 0,
-            Some(Shading::PerPixel(active, _)) => active.diffuse.len(),
-            None => stage.world.lights.len(),
+            Some(Shading::PerPixel(shading)) => shading.lights(),
+            None => usual_lights(stage.world.lights.len()),
         }
     }
 
