@@ -94,9 +94,16 @@ fn leaves_divide_every_visible_triangle_and_colour_its_pixels_as_they_say() {
     let mut engine = engine(&scene, Method::Adaptive);
     let mut frame = Frame::new(SIZE.0, SIZE.1);
     engine.for_each_leaf(|leaf| panic!("there is no image yet, but {leaf:?}"));
+    // Beginning with Gouraud shading, then again with as much as is done before the first image is drawn.
+    let from_nothing = [0, 30_000, 20_000, 100_000, 50_000, 500_000].map(|units| (units, false));
+    let from_some = [(400_000, true), (200_000, false), (500_000, false)];
 
     let mut seen: HashMap<&str, u32> = HashMap::new();
-    for units in [0, 30_000, 20_000, 100_000, 50_000, 500_000] {
+    let mut squares: HashMap<&str, [f64; 2]> = HashMap::new();
+    for (units, is_cold) in from_nothing.into_iter().chain(from_some) {
+        if is_cold {
+            engine.forget();
+        }
         engine.render(&scene, Budget::Work(units), &mut frame);
         let all = leaves(&engine);
         for (&triangle, leaves) in &all {
@@ -131,6 +138,27 @@ fn leaves_divide_every_visible_triangle_and_colour_its_pixels_as_they_say() {
                     *seen.entry("per pixel").or_default() += 1;
                     reference.codes[index]
                 }
+                // Quadratics, besides highlights evaluated at every pixel: close to what is right, and no more than that.
+                (true, kind @ (LeafKind::Curved | LeafKind::Highlights)) => {
+                    let name = if kind == LeafKind::Curved {
+                        "curved"
+                    } else {
+                        "highlights"
+                    };
+                    *seen.entry(name).or_default() += 1;
+                    let square = |codes: [f64; 3]| -> f64 {
+                        let off = (0..3).map(|k| reference.codes[index][k] - codes[k]);
+                        off.map(|o| o * o).sum()
+                    };
+                    let interpolated = std::array::from_fn(|k| {
+                        let corners = leaf.colours.map(|c| f64::from(c[k]));
+                        let linear: f64 = (0..3).map(|i| weights[i] * corners[i]).sum();
+                        encode(linear.clamp(0.0, 1.0))
+                    });
+                    let sums = squares.entry(name).or_default();
+                    *sums = [sums[0] + square([r, g, b]), sums[1] + square(interpolated)];
+                    continue;
+                }
                 (true, LeafKind::Interpolated | LeafKind::Proved) => {
                     let name = if leaf.level > 0 { "finer" } else { "whole" };
                     *seen.entry(name).or_default() += 1;
@@ -148,7 +176,17 @@ fn leaves_divide_every_visible_triangle_and_colour_its_pixels_as_they_say() {
         }
         assert!(checked > 5000, "{checked} pixels checked");
     }
-    for name in ["waiting", "per pixel", "finer", "whole"] {
+    for (name, [shown, interpolated]) in squares {
+        assert!(shown < 0.5 * interpolated, "{name}: {shown} {interpolated}");
+    }
+    for name in [
+        "waiting",
+        "per pixel",
+        "finer",
+        "whole",
+        "curved",
+        "highlights",
+    ] {
         assert!(seen.get(name).is_some_and(|&n| n > 100), "{name}: {seen:?}");
     }
 }

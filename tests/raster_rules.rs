@@ -5,7 +5,8 @@ mod support;
 
 use specula::backend::software::{NO_TRIANGLE, SoftwareBackend};
 use specula::backend::{Backend, BasePaint};
-use specula::geometry::Vec3s;
+use specula::geometry::curved::{node_count, node_index, part_index, part_nodes, through};
+use specula::geometry::{CurvedTriangles, Vec3s};
 use specula::illumination::reference::shade;
 use specula::output::Frame;
 use specula::output::encode::{encode, encode_u8};
@@ -416,8 +417,35 @@ fn colourful(random: &mut Random) -> (World, Vec3s) {
     (world, colours)
 }
 
+/// Some triangles divided by any number, with random colours at their nodes.
+fn curved_at_random(random: &mut Random, triangles: u32) -> CurvedTriangles {
+    let mut curved = CurvedTriangles::default();
+    curved.clear(triangles as usize);
+    for triangle in (0..triangles).filter(|triangle| triangle % 4 != 0) {
+        let n = [8, 1, 2, 4][triangle as usize % 7 % 4];
+        // Not so steep that rounded weights would show.
+        let mut node = || random.rgb().map(|c| 0.3 + 0.1 * c);
+        let nodes: Vec<_> = (0..node_count(n)).map(|_| node()).collect();
+        let first = curved.split_mut().1.len();
+        curved.push(triangle, n);
+        let parts = &mut curved.split_mut().1[first..];
+        for (i, j) in (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j))) {
+            let kinds = if i + j < n - 1 {
+                [true, false].as_slice()
+            } else {
+                &[true]
+            };
+            for &upright in kinds {
+                let six = part_nodes(i, j, upright).map(|[a, b]| nodes[node_index(n, a, b)]);
+                parts[part_index(n, i, j, upright)] = through(six);
+            }
+        }
+    }
+    curved
+}
+
 #[test]
-fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
+fn gouraud_curved_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
     let mut random = Random(8);
     let (world, colours) = colourful(&mut random);
     let view = perspective(150, 100, 90.0, 0.1, 50.0);
@@ -428,12 +456,18 @@ fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
         .for_each(|_| flat_colours.push(random.rgb()));
     let all = 0..world.triangles.len() as u32;
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
+    let curved = curved_at_random(&mut random, all.end);
+    let curved_paint = BasePaint::Curved {
+        colours: &colours,
+        curved: &curved,
+    };
     let mut backend = SoftwareBackend::new();
     for exec in levels() {
         backend.rasterize(exec, geometry);
         let ids = Visibility::of(&backend).ids;
         for (paint, name) in [
             (BasePaint::Gouraud(&colours), "gouraud"),
+            (curved_paint, "curved"),
             (BasePaint::Flat(&flat_colours), "flat"),
             (BasePaint::Phong, "phong"),
         ] {
@@ -459,6 +493,10 @@ fn gouraud_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
                         BasePaint::Gouraud(colours) | BasePaint::Refined { colours, .. } => {
                             mix(colours).map(f64::from)
                         }
+                        BasePaint::Curved { colours, curved } => curved
+                            .colour(id, w[1], w[2])
+                            .unwrap_or_else(|| mix(colours))
+                            .map(f64::from),
                         BasePaint::Flat(colours) => colours.get(id as usize).map(f64::from),
                         BasePaint::Phong => {
                             let to_f64 = |v: [f32; 3]| glam::DVec3::from_array(v.map(f64::from));
@@ -505,7 +543,12 @@ fn colours_do_not_depend_on_threads() {
     let view = perspective(333, 222, 200.0, 0.1, 50.0);
     let all = 0..world.triangles.len() as u32;
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
-    for paint in [BasePaint::Gouraud(&colours), BasePaint::Phong] {
+    let curved = curved_at_random(&mut random, all.end);
+    let curved_paint = BasePaint::Curved {
+        colours: &colours,
+        curved: &curved,
+    };
+    for paint in [BasePaint::Gouraud(&colours), curved_paint, BasePaint::Phong] {
         let draw = |exec| {
             let mut backend = SoftwareBackend::new();
             let mut frame = Frame::new(333, 222);

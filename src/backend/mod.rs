@@ -25,7 +25,7 @@ pub mod suite;
 
 pub use kind::BackendKind;
 
-use crate::geometry::{Bary, Quadratic, Vec3s};
+use crate::geometry::{Bary, CurvedTriangles, Quadratic, Vec3s};
 use crate::illumination::ActiveLights;
 pub use crate::output::Interpolation;
 use crate::output::{Rect, Target};
@@ -104,6 +104,13 @@ pub struct RasterCounts {
 pub enum BasePaint<'a> {
     /// Linear colours of the world's vertices, interpolated (those of visible triangles are valid).
     Gouraud(&'a Vec3s),
+    /// Like `Gouraud`, but some triangles have curved colours. Only for backends that refine in place.
+    Curved {
+        /// Linear colours of the world's vertices (those of visible triangles are valid).
+        colours: &'a Vec3s,
+        /// Those triangles.
+        curved: &'a CurvedTriangles,
+    },
     /// One linear colour for each of the world's triangles (those of visible triangles are valid).
     Flat(&'a Vec3s),
     /// The illumination equation at every pixel, all lights. Only for backends that can shade per pixel.
@@ -206,7 +213,7 @@ pub enum Fill {
 ///
 /// **Failure.** No call panics, or fails otherwise, whatever the coordinates and colours are. A device that can fail
 /// keeps that to itself and shows the background.
-pub trait Backend: Debug + Send {
+pub trait Backend: Debug + Send + Sync {
     /// What it can do; always the same.
     fn capabilities(&self) -> Capabilities;
 

@@ -63,6 +63,8 @@ pub enum Call {
 pub enum Paint {
     /// [`BasePaint::Gouraud`].
     Gouraud,
+    /// [`BasePaint::Curved`].
+    Curved,
     /// [`BasePaint::Flat`].
     Flat,
     /// [`BasePaint::Phong`].
@@ -123,6 +125,7 @@ impl RecordingBackend {
     fn log_resolve(&self, paint: BasePaint<'_>) {
         self.log.push(Call::Resolve(match paint {
             BasePaint::Gouraud(_) => Paint::Gouraud,
+            BasePaint::Curved { .. } => Paint::Curved,
             BasePaint::Flat(_) => Paint::Flat,
             BasePaint::Phong => Paint::Phong,
             BasePaint::Refined { parts, .. } => Paint::Refined(parts.to_vec()),

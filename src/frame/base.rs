@@ -6,6 +6,7 @@ use crate::backend::{Backend, BasePaint, Geometry, RasterCounts};
 use crate::geometry::Vec3s;
 use crate::illumination::{PointBatch, VertexSet};
 use crate::parallel::{Exec, Turn};
+use crate::refine::{Curving, CurvingRule};
 use crate::scene::{View, World};
 use crate::visibility::{CullCounts, Culler};
 use std::ops::Range;
@@ -24,6 +25,8 @@ pub(super) struct BaseImage {
     raster: RasterCounts,
     /// Triangles that own a pixel.
     visible_triangles: u64,
+    /// Which of them have curved colours.
+    curving: Curving,
 }
 
 impl BaseImage {
@@ -39,6 +42,28 @@ impl BaseImage {
     /// Linear colours of the vertices of visible triangles.
     pub(super) fn colours(&self) -> &Vec3s {
         &self.colours
+    }
+
+    /// Triangles that are divided in the first image.
+    pub(super) fn curving(&self) -> &Curving {
+        &self.curving
+    }
+
+    pub(super) fn curving_mut(&mut self) -> &mut Curving {
+        &mut self.curving
+    }
+
+    /// Begins to divide large triangles, by a rule.
+    pub(super) fn begin_curving(&mut self, backend: &dyn Backend, rule: CurvingRule) {
+        let pixels = |triangle| backend.visible_pixels(triangle);
+        self.curving
+            .begin(backend.visible_triangles(), &pixels, rule);
+    }
+
+    /// Completes that.
+    pub(super) fn finish_curving(&mut self, exec: Exec, world: &World, backend: &dyn Backend) {
+        let pixels = |triangle| backend.visible_pixels(triangle);
+        self.curving.finish(exec, world, &pixels);
     }
 
     pub(super) fn cull(&mut self, culler: &mut Culler, view: &View) {
@@ -159,6 +184,10 @@ impl BaseImage {
         let paint = match method {
             method if method.shades_first_image_per_pixel() => BasePaint::Phong,
             Method::Flat => BasePaint::Flat(&self.colours),
+            _ if !self.curving.curved().is_empty() => BasePaint::Curved {
+                colours: &self.colours,
+                curved: self.curving.curved(),
+            },
             _ => BasePaint::Gouraud(&self.colours),
         };
         let geometry = self.geometry(world, view);

@@ -9,13 +9,14 @@
 //! | `shelf.rs` | the pictures: one at full resolution, one at a lower one, and one that is still shown while that is drawn anew |
 //! | `picture.rs` | an image in the making, stage by stage, each of which may be interrupted |
 //! | `motion.rs` | which triangles have moved since a picture was drawn |
-//! | `base.rs` | what the stages of a first image do |
+//! | `base.rs`, `curves.rs` | what the stages of a first image do |
 //! | `refinement/` | makes it better; `refine_first.rs` is how, where the backend cannot repaint, `tiles.rs` is a simple rival |
 //! | `handover.rs` | brings the caller's frame up to date |
 //! | `load.rs`, `calibration.rs` | how much work a first image is, and what work takes on this machine |
 
 mod base;
 mod calibration;
+mod curves;
 mod engine;
 mod handover;
 mod load;

@@ -21,6 +21,7 @@ pub(super) use refining::Easel;
 
 use super::Method;
 use super::base::BaseImage;
+use super::curves::{self, CurvedLoad, Curves};
 use super::load::ImageLoad;
 use super::motion::Motion;
 use super::refine_first::RefineFirst;
@@ -64,6 +65,8 @@ pub(super) struct Picture {
     is_begun: bool,
     /// What of the image before may be kept.
     motion: Motion,
+    /// How triangles of its first image are curved.
+    curves: Curves,
     /// Whether the stage in hand is yet to be begun.
     is_fresh: bool,
     /// What the stage in hand has taken in earlier frames, and in this one so far.
@@ -89,9 +92,16 @@ pub(super) struct Studio<'a> {
 
 impl Studio<'_> {
     /// Milliseconds that giving the image of `view` its colours will probably not exceed.
-    pub(super) fn colouring_ms(&self, view: &View) -> f64 {
-        let load = (self.load).resolve(self.method, self.world.lights.len(), view);
+    pub(super) fn colouring_ms(&self, view: &View, curved: CurvedLoad) -> f64 {
+        let load = self.colouring(view, curved);
         self.costs.predict_at_most_ms(Kind::Resolve, load)
+    }
+
+    /// What giving the image of `view` its colours takes.
+    fn colouring(&self, view: &View, curved: CurvedLoad) -> Load {
+        let mut load = (self.load).resolve(self.method, self.world.lights.len(), view);
+        load.pixels_ns += curved.pixels_ns;
+        load
     }
 }
 
@@ -108,6 +118,7 @@ impl Picture {
             pass: Pass::Empty,
             is_begun: false,
             motion: Motion::default(),
+            curves: Curves::default(),
             is_fresh: true,
             stage_ms: 0.0,
             right_in: None,
@@ -258,6 +269,55 @@ impl Picture {
         true
     }
 
+    /// Divides large triangles, if the image lacks only its colours, and if there will be time for it beside giving it those and handing it
+    /// over, which takes `handing_over_ms`.
+    pub(super) fn curve(
+        &mut self,
+        studio: &mut Studio<'_>,
+        allowance: &Allowance<'_>,
+        handing_over_ms: f64,
+    ) {
+        let Some(view) = self
+            .view
+            .filter(|_| self.pass == Pass::Colouring && self.is_fresh)
+        else {
+            return;
+        };
+        let was_curved = !self.base.curving().curved().is_empty();
+        self.base.curving_mut().clear();
+        self.curves = Curves::default();
+        let can_be = studio.method == Method::Adaptive
+            && self.divisor == 1
+            && self.backend.capabilities().refines_in_place()
+            // Tiles that are kept are not curved.
+            && (was_curved || !self.motion.has_its_light);
+        if !can_be {
+            return;
+        }
+        let ending_ms = (studio.colouring_ms(&view, self.curves.load) + handing_over_ms)
+            * studio.stages.slowness(studio.predicted);
+        let since = allowance.elapsed_ms();
+        self.curves = curves::curve(
+            &mut self.base,
+            studio.exec,
+            studio.world,
+            &view,
+            &*self.backend,
+            studio.costs,
+            allowance,
+            ending_ms,
+        );
+        studio.stages.refine += allowance.elapsed_ms() - since;
+        studio.predicted.refine += studio
+            .costs
+            .predict_ms(Kind::Plan, Load::of_items(self.curves.load.nodes_ns));
+    }
+
+    /// How triangles are curved.
+    pub(super) fn curves(&self) -> Curves {
+        self.curves
+    }
+
     /// Gives the image its colours. False when time was up before, which is never if it is to be done `at_once`.
     pub(super) fn colour(
         &mut self,
@@ -268,9 +328,7 @@ impl Picture {
         let Some(view) = self.view.filter(|_| self.pass == Pass::Colouring) else {
             return self.pass > Pass::Colouring;
         };
-        let load = studio
-            .load
-            .resolve(studio.method, studio.world.lights.len(), &view);
+        let load = studio.colouring(&view, self.curves.load);
         let since = allowance.elapsed_ms();
         // On a backend that cannot repaint, refinement comes first.
         let is_done = if self.refines_first(studio.method) {

@@ -3,6 +3,7 @@
 pub mod bary;
 mod closed;
 pub mod clusters;
+pub mod curved;
 pub mod import;
 mod mesh;
 pub mod normals;
@@ -15,6 +16,7 @@ pub mod viewport;
 
 pub use bary::Bary;
 pub use clusters::{Cluster, build_clusters};
+pub use curved::CurvedTriangles;
 pub use mesh::{Mesh, MeshError};
 pub use quadratic::Quadratic;
 pub use topology::Topology;

@@ -76,7 +76,10 @@ mod tests {
         for w in [[0.2, 0.3, 0.5], [0.0, 0.9, 0.1], [1.0 / 3.0; 3]] {
             let (got, want) = (quadratic.at(w), function(w));
             for channel in 0..3 {
-                assert!((got[channel] - want[channel]).abs() < 1e-6, "{got:?} {want:?}");
+                assert!(
+                    (got[channel] - want[channel]).abs() < 1e-6,
+                    "{got:?} {want:?}"
+                );
             }
         }
         assert!(!quadratic.is_linear());
@@ -94,6 +97,9 @@ mod tests {
             assert_eq!(quadratic.at(w), other.at(w));
         }
         assert!(Quadratic::linear(CORNERS).is_linear());
-        assert_eq!(Quadratic::linear(CORNERS).at([0.2, 0.3, 0.5]), [0.2, 0.3, 0.5]);
+        assert_eq!(
+            Quadratic::linear(CORNERS).at([0.2, 0.3, 0.5]),
+            [0.2, 0.3, 0.5]
+        );
     }
 }

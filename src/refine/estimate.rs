@@ -194,6 +194,20 @@ pub fn mean_square(corners: [[f32; 3]; 3], midpoints: [[f32; 3]; 3]) -> f32 {
     (sum / (180.0 * 3.0)).max(0.0)
 }
 
+/// The square of a small difference of two linear colours, in squared codes and as a mean over the channels, one of them being `colour`.
+#[must_use]
+pub fn squared_codes(encoding: Encoding, colour: [f32; 3], difference: [f32; 3]) -> f32 {
+    let squares = (0..3).map(|channel| {
+        let squared_slope = match encoding {
+            // That of the square root, as above, and not of black. White is white.
+            Encoding::Srgb => 127.5 * 127.5 / colour[channel].clamp(0.002, 1.0),
+            Encoding::Linear => 255.0 * 255.0,
+        };
+        squared_slope * difference[channel] * difference[channel]
+    });
+    squares.sum::<f32>() / 3.0
+}
+
 /// How many points inside a leaf of `pixels` pixels are sampled.
 #[must_use]
 pub fn sample_count(pixels: u32) -> usize {

@@ -28,12 +28,14 @@
 //! ([`Forest::draw_once`]). Nothing is closed there, and every triangle that is drawn follows its neighbours' splits,
 //! so that no T-junction can become a crack.
 
+mod curving;
 pub mod estimate;
 mod forest;
 mod shown;
 mod split;
 mod vertices;
 
+pub use curving::{Curving, CurvingCounts, CurvingRule};
 pub use forest::{FIRST_LEAVES, Forest, Leaf, LeafId, LeafState};
 pub use split::{PlanOutcome, SplitOutcome};
 

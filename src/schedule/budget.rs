@@ -140,6 +140,45 @@ impl<'a> Allowance<'a> {
         }
     }
 
+    /// In how many rounds the triangles of the first image in hand are to be divided in a replayed frame, and whether the last of them is to
+    /// be taken back.
+    #[must_use]
+    pub fn replayed_rounds(&self) -> Option<(u32, bool)> {
+        match self.budget {
+            Budget::Replay(record) => {
+                let bits = record.divisions >> self.place_of_rounds();
+                Some((bits & 7, bits & 8 != 0))
+            }
+            _ => None,
+        }
+    }
+
+    /// Notes in how many rounds the triangles of the first image in hand have been divided, and whether the last was taken back.
+    pub fn note_rounds(&mut self, rounds: u32, taken_back: bool) {
+        let bits = rounds.min(7) | u32::from(taken_back) << 3;
+        self.done.divisions |= bits << self.place_of_rounds();
+    }
+
+    /// Where the record has the rounds of the image in hand. Nobody completes more than eight in a frame.
+    fn place_of_rounds(&self) -> u32 {
+        4 * self.done.images.min(7)
+    }
+
+    /// Whether there is room for `units` of work that, with what has to come after it, will take `ms` milliseconds. Unlike
+    /// [`admit`](Self::admit) it may be asked again, for less.
+    #[must_use]
+    pub fn affords(&self, units: u64, ms: f64) -> bool {
+        if self.is_over || self.is_cancelled() {
+            return false;
+        }
+        match self.budget {
+            Budget::Unlimited | Budget::Error(_) => true,
+            Budget::Work(total) => self.spent_units.saturating_add(units) <= total,
+            Budget::Replay(_) => false,
+            Budget::Millis(budget_ms) => self.elapsed_ms() + ms <= budget_ms,
+        }
+    }
+
     /// Notes the divisor chosen.
     pub fn note_divisor(&mut self, divisor: u32) {
         self.done.divisor = divisor;

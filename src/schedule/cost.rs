@@ -61,6 +61,16 @@ pub const FIND_VERTEX_NS: f32 = 5.0;
 pub const RESOLVE_TRIANGLE_NS: f32 = 30.0;
 /// See [`RESOLVE_TRIANGLE_NS`]: a part for each pixel covered, unless it is shaded on its own.
 pub const RESOLVE_PIXEL_NS: f32 = 1.8;
+/// Curving a triangle before the first image is coloured: a fixed part, and one for each of its parts.
+pub const CURVE_NS: f32 = 100.0;
+/// See [`CURVE_NS`].
+pub const CURVE_PART_NS: f32 = 25.0;
+/// See [`CURVE_NS`]: a part for each node, without its illumination.
+pub const CURVE_NODE_NS: f32 = 6.0;
+/// What a pixel of a curved triangle takes beyond one of another: of a single part.
+pub const CURVED_PIXEL_NS: f32 = 0.3;
+/// The same of one with several parts.
+pub const PARTED_PIXEL_NS: f32 = 1.0;
 /// Enlarging an image: a part for each pixel written.
 pub const ENLARGE_PIXEL_NS: f32 = 0.6;
 
@@ -103,6 +113,22 @@ pub fn phong(pixels: f32, lights: usize) -> f32 {
 #[must_use]
 pub fn first_image(triangles: f32, pixels: f32) -> f32 {
     triangles * FIRST_TRIANGLE_NS + pixels * FIRST_PIXEL_NS
+}
+
+/// Curving triangles with so many nodes and parts under `lights` lights, their pixels aside.
+#[must_use]
+pub fn curved(triangles: f32, nodes: f32, parts: f32, lights: usize) -> f32 {
+    triangles * CURVE_NS + nodes * CURVE_NODE_NS + vertices(nodes, lights) + parts * CURVE_PART_NS
+}
+
+/// What a pixel of a triangle divided by `n` takes beyond one that is not curved.
+#[must_use]
+pub fn curved_pixel(n: u32) -> f32 {
+    match n {
+        0 => 0.0,
+        1 => CURVED_PIXEL_NS,
+        _ => PARTED_PIXEL_NS,
+    }
 }
 
 /// Drawing `triangles` triangles of `pixels` pixels altogether on a backend that cannot repaint.

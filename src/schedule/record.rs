@@ -15,6 +15,10 @@ pub struct FrameRecord {
     pub images: u32,
     /// Whether a further one was begun.
     pub is_image_begun: bool,
+    /// How finely triangles were divided before first images got their colours: four bits for each image, from the lowest up: the number
+    /// of rounds of division in three of them, and whether the last round was taken back.
+    #[serde(default)]
+    pub divisions: u32,
     /// Steps of refinement that were admitted.
     pub steps: u64,
 }
@@ -27,6 +31,7 @@ impl Default for FrameRecord {
             divisor: 1,
             images: 0,
             is_image_begun: false,
+            divisions: 0,
             steps: 0,
         }
     }

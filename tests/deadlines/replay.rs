@@ -243,6 +243,7 @@ fn records_of_something_else_do_no_harm() {
                     divisor,
                     images,
                     is_image_begun,
+                    divisions: images.wrapping_mul(0x9e37),
                     steps,
                 };
                 let scene = turned(&scene, steps % 7);

@@ -77,8 +77,8 @@ pub(super) fn collect(
                 }
             }
         }
-        // Never asked for: it is not among the capabilities.
-        BasePaint::Phong => {}
+        // Never asked for: they are not among the capabilities.
+        BasePaint::Phong | BasePaint::Curved { .. } => {}
     }
 }
 

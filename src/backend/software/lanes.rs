@@ -6,9 +6,10 @@
 //! [`LEAST_SUM`] counts as zero, since its reciprocal might overflow; the coefficients are scaled to a largest of 1.
 
 use crate::geometry::Vec3s;
+use crate::geometry::curved::PartColours;
 use crate::geometry::screen::Interpolator;
 use crate::simd::Simd;
-use fearless_simd::{Select, SimdBase, SimdFloat, SimdMask};
+use fearless_simd::{Select, SimdBase, SimdFloat, SimdInt, SimdMask};
 
 /// Sums of edge planes below this count as zero.
 const LEAST_SUM: f32 = 1e-30;
@@ -82,6 +83,105 @@ pub(super) fn interpolate<S: Simd>(simd: S, w: Lanes3<S>, corners: &Corners3) ->
     for (i, out) in out.iter_mut().enumerate() {
         let [a, b, c] = splat3(simd, [corners[0][i], corners[1][i], corners[2][i]]);
         *out = w[2].mul_add(c, w[1].mul_add(b, w[0] * a));
+    }
+    out
+}
+
+/// A part of a triangle, in which the next pixels lie as a rule.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PartHint {
+    number: usize,
+    /// Row and column.
+    at: [f32; 2],
+    is_upright: bool,
+}
+
+impl PartHint {
+    /// The first part.
+    pub(super) const FIRST: Self = Self {
+        number: 0,
+        at: [0.0; 2],
+        is_upright: true,
+    };
+}
+
+/// Colours of a triangle divided by `n`, in the lanes of `mask`; in others what there was before. See [`curved`](crate::geometry::curved).
+/// The hint saves time and changes nothing; it must be of the same triangle.
+#[inline(always)]
+pub(super) fn curved_colours<S: Simd>(
+    simd: S,
+    w: Lanes3<S>,
+    n: u32,
+    parts: &[PartColours],
+    hint: &mut PartHint,
+    mask: S::mask32s,
+    before: Lanes3<S>,
+) -> Lanes3<S> {
+    if n == 1 {
+        return select3::<S>(mask, part_colours(simd, &parts[0], w[1], w[2]), before);
+    }
+    let one = S::f32s::splat(simd, 1.0);
+    let (across, down) = (w[1] * n as f32, w[2] * n as f32);
+
+    let (u, v) = (across - hint.at[0], down - hint.at[1]);
+    let (least, most) = (u.min(v), u.max(v));
+    let is_upright = (u + v).simd_le(one).to_bitmask();
+    let in_square = (least.simd_ge(0.0) & most.simd_lt(1.0)).to_bitmask();
+    let of_kind = if hint.is_upright {
+        is_upright
+    } else {
+        !is_upright
+    };
+    if mask.to_bitmask() & !(in_square & of_kind) == 0 {
+        let (u, v) = if hint.is_upright {
+            (u, v)
+        } else {
+            (one - u, one - v)
+        };
+        let colour = part_colours(simd, &parts[hint.number], u, v);
+        return select3::<S>(mask, colour, before);
+    }
+
+    let most = n as i32 - 1;
+    let i = across.to_int::<S::i32s>().min(most);
+    let j = down.to_int::<S::i32s>().min(S::i32s::splat(simd, most) - i);
+    let (row, column) = (i.to_float::<S::f32s>(), j.to_float::<S::f32s>());
+    let (u, v) = (across - row, down - column);
+    let upright = (u + v).simd_le(one) | (i + j).simd_eq(most);
+    let (u, v) = (upright.select(u, one - u), upright.select(v, one - v));
+    let of_row = i * (S::i32s::splat(simd, 2 * n as i32) - i);
+    let (zero, upside_down) = (S::i32s::splat(simd, 0), S::i32s::splat(simd, 1));
+    let part = of_row + j + j + upright.select(zero, upside_down);
+    // The parts in the vector, one after the other: few as a rule.
+    let (mut left, mut out) = (mask.to_bitmask(), before);
+    let numbers = part.as_slice();
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize;
+        let number = numbers[lane];
+        let alike = part.simd_eq(number);
+        let colour = part_colours(simd, &parts[number as usize], u, v);
+        out = select3::<S>(alike & mask, colour, out);
+        left &= !alike.to_bitmask();
+        if left == 0 {
+            *hint = PartHint {
+                number: number as usize,
+                at: [row.as_slice()[lane], column.as_slice()[lane]],
+                is_upright: upright.to_bitmask() >> lane & 1 == 1,
+            };
+        }
+    }
+    out
+}
+
+/// The quadratic of a part.
+#[inline(always)]
+fn part_colours<S: Simd>(simd: S, part: &PartColours, u: S::f32s, v: S::f32s) -> Lanes3<S> {
+    let mut out = [u; 3];
+    for (out, [o, a, b, uu, uv, vv]) in out.iter_mut().zip(part) {
+        let splat = |value: &f32| S::f32s::splat(simd, *value);
+        let of_u = u.mul_add(splat(uu), v.mul_add(splat(uv), splat(a)));
+        let of_v = v.mul_add(splat(vv), splat(b));
+        *out = u.mul_add(of_u, v.mul_add(of_v, splat(o)));
     }
     out
 }

@@ -8,14 +8,17 @@
 //! illuminated together, once for each material), and the vector is encoded once. What a lane gets does not depend on its
 //! neighbours.
 
-use super::lanes::{Corners3, Lanes3, gather, interpolate, select3, splat3, weights_at};
+use super::lanes::{
+    Corners3, Lanes3, PartHint, curved_colours, gather, interpolate, select3, splat3, weights_at,
+};
 use super::setup::Drawn;
 use super::shares::Shares;
 use super::tile::{
     BLOCK_PIXELS, BLOCK_SIDE, BlockSet, NO_TRIANGLE, TILE_BLOCKS, Tile, block_corner,
 };
 use crate::backend::{BasePaint, Geometry};
-use crate::geometry::Vec3s;
+use crate::geometry::curved::PartColours;
+use crate::geometry::{CurvedTriangles, Vec3s};
 use crate::illumination::{ActiveLights, ShadingKit, shade_lanes};
 use crate::output::encode::encode_lanes;
 use crate::parallel::{Pace, Watch};
@@ -98,6 +101,19 @@ pub(super) fn resolve_tile<S: Simd>(
             };
             let pace = Pace::new(watch, BLOCKS_AT_ONCE);
             paint_tile(simd, tile, painter, &mut gouraud, left, pace)
+        }
+        BasePaint::Curved { colours, curved } => {
+            let mut surface = Curved {
+                painter,
+                colours,
+                curved,
+                last: NO_TRIANGLE,
+                corners: Corners3::default(),
+                parts: None,
+                hint: PartHint::FIRST,
+            };
+            let pace = Pace::new(watch, BLOCKS_AT_ONCE);
+            paint_tile(simd, tile, painter, &mut surface, left, pace)
         }
         BasePaint::Flat(colours) => {
             let pace = Pace::new(watch, BLOCKS_AT_ONCE);
@@ -267,6 +283,48 @@ impl Surface for Gouraud<'_> {
             }
             let colour = interpolate(simd, w, &self.corners);
             out = select3::<S>(mask, colour, out);
+            left &= !mask.to_bitmask();
+        }
+        out
+    }
+}
+
+/// Vertex colours, interpolated, but for triangles that are curved.
+struct Curved<'a> {
+    painter: &'a Painter<'a>,
+    colours: &'a Vec3s,
+    curved: &'a CurvedTriangles,
+    /// The slot painted last, its corners' colours, and its parts.
+    last: u32,
+    corners: Corners3,
+    parts: Option<(u32, &'a [PartColours])>,
+    hint: PartHint,
+}
+
+impl Surface for Curved<'_> {
+    #[inline(always)]
+    fn colours<S: Simd>(
+        &mut self,
+        simd: S,
+        owners: Owners<'_, S>,
+        covered: u64,
+        background: Lanes3<S>,
+    ) -> Lanes3<S> {
+        let (mut left, mut out) = (covered, background);
+        while left != 0 {
+            let (slot, mask) = owners.first(left);
+            let drawn = self.painter.shares.drawn(slot);
+            let w = owners.weights(simd, drawn);
+            if slot != self.last {
+                self.parts = self.curved.get(drawn.id);
+                self.corners = gather(self.colours, drawn.vertices);
+                self.hint = PartHint::FIRST;
+                self.last = slot;
+            }
+            out = match self.parts {
+                Some((n, parts)) => curved_colours(simd, w, n, parts, &mut self.hint, mask, out),
+                None => select3::<S>(mask, interpolate(simd, w, &self.corners), out),
+            };
             left &= !mask.to_bitmask();
         }
         out

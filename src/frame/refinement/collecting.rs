@@ -15,6 +15,7 @@ use super::{PIECE_UNITS, Refinement, Root, Stage, drawn_once};
 use crate::geometry::Vec3s;
 use crate::highlight::{self, SignBits};
 use crate::parallel::Exec;
+use crate::refine::Curving;
 use crate::refine::estimate::Samples;
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, Rank, cost};
@@ -53,6 +54,8 @@ struct Source<'a> {
     /// Linear colours of the vertices.
     colours: &'a Vec3s,
     ranking: RootRanking<'a>,
+    /// Triangles that are divided.
+    curving: &'a Curving,
     /// No material lacks a specular term.
     all_specular: bool,
     /// What is remembered, if anything may be.
@@ -204,7 +207,10 @@ impl Collector {
         for (root, is_sampled) in roots.iter_mut().zip(self.is_sampled.iter_mut()) {
             let mass = root.pixels as f32 * root.prior;
             *is_sampled = root.pixels >= PIXELS_FOR_CENTROID || mass >= MASS_FOR_CENTROID;
-            if let Some(memory) = source.memory
+            root.is_curved = source.curving.error(root.triangle).is_some();
+            if root.is_curved {
+                // What the quadratics leave is known, as far as their nodes tell.
+            } else if let Some(memory) = source.memory
                 && let Some(error) = memory.recall(root.triangle)
             {
                 root.prior = error.max(ranking::ERROR_FLOOR);
@@ -241,6 +247,10 @@ impl Collector {
             let [r, g, b] = samples.deviation(sample);
             let square = (r * r + g * g + b * b) / 3.0;
             roots[index].prior += ranking::centroid_error(square, roots[index].is_pht);
+        }
+        for root in roots.iter_mut().filter(|root| root.is_curved) {
+            let (divisions, error) = source.curving.of(root.triangle);
+            root.prior = ranking::curved_error(root.prior, divisions, error);
         }
     }
 }
@@ -330,6 +340,7 @@ impl Refinement {
             world: stage.world,
             view: stage.view,
             colours: stage.base.colours(),
+            curving: stage.base.curving(),
             ranking: RootRanking {
                 forest: &self.forest,
                 lights: stage.world.lights.len(),

@@ -18,6 +18,8 @@ use crate::scene::World;
 pub enum LeafKind {
     /// Colours are interpolated between the corners; it may be refined further.
     Interpolated,
+    /// It was divided before the first image was drawn, and has a quadratic over each part.
+    Curved,
     /// The illumination equation is evaluated at every pixel.
     PerPixel,
     /// Its highlights, and lights that set on it, are evaluated at every pixel; the rest is interpolated as a quadratic. It may be shaded
@@ -112,6 +114,9 @@ impl Refinement {
                 is_pht: root.is_pht,
                 ..Leaf::root(root.triangle, colours, root.pixels)
             };
+            if root.is_curved {
+                leaf.kind = LeafKind::Curved;
+            }
             if root.progress == Progress::Done {
                 let shade = self.root_shading(root).map(|known| known.shade);
                 self.shade(&mut leaf, root, shade.unwrap_or_default());

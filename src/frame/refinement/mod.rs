@@ -43,6 +43,7 @@ pub use leaves::{Leaf, LeafKind};
 use memory::Memory;
 use parts::Part;
 use places::Places;
+pub(super) use shading::usual_lights;
 use shading::{Polish, RootShading, Shade};
 use std::collections::VecDeque;
 
@@ -94,6 +95,8 @@ struct Root {
     /// Where in [`Refinement::shadings`] it is said how its pixels are shaded, once that has been asked; or [`NONE`].
     shading: u32,
     is_pht: bool,
+    /// Divided before the first image was drawn.
+    is_curved: bool,
     progress: Progress,
     /// Subdivided.
     is_split: bool,
@@ -110,6 +113,7 @@ impl Root {
             prior: 0.0,
             shading: NONE,
             is_pht: false,
+            is_curved: false,
             progress: Progress::Waiting,
             is_split: false,
             is_refined: false,

@@ -198,7 +198,7 @@ impl Refinement {
             places
                 .get(triangle)
                 .map(|index| roots[index as usize])
-                .filter(|root| root.progress != Progress::Done)
+                .filter(|root| root.progress != Progress::Done && !root.is_curved)
                 .map_or(0, |root| root.pixels)
         };
         let colours = stage.base.colours();

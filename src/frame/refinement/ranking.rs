@@ -30,6 +30,9 @@ const SPLIT_YIELD: f32 = 0.5;
 /// A triangle that is to be planted comes so much sooner: planting costs little beside what it tells.
 const CURIOSITY: f32 = 4.0;
 
+/// Share of what is guessed of a triangle that may be left when it is divided by 1.
+const CURVED_GUESS: f32 = 0.5;
+
 /// Points that a new leaf has to itself: three edge midpoints, most of them shared by two leaves.
 const POINTS_PER_LEAF: f32 = 1.5;
 
@@ -51,19 +54,6 @@ pub(super) fn lightness(encoding: Encoding, [r, g, b]: [f32; 3]) -> f32 {
             Encoding::Srgb => light.sqrt(),
             Encoding::Linear => light,
         }
-}
-
-/// The square of a small difference of two linear colours, in squared codes and as a mean over the channels, one of them being `colour`.
-pub(super) fn squared_codes(encoding: Encoding, colour: [f32; 3], difference: [f32; 3]) -> f32 {
-    let squares = (0..3).map(|channel| {
-        let slope = match encoding {
-            // That of the square root, as above, and not of black.
-            Encoding::Srgb => 127.5 / colour[channel].clamp(0.002, 1.0).sqrt(),
-            Encoding::Linear => 255.0,
-        };
-        (slope * difference[channel]).powi(2)
-    });
-    squares.sum::<f32>() / 3.0
 }
 
 /// First guess of a triangle's mean squared error, of which only the lightness of its corners is known: shading that changes by so many
@@ -88,6 +78,13 @@ pub(super) fn prior_error([a, b, c]: [f32; 3], is_pht: bool) -> f32 {
 /// highlight, or beside it.
 pub(super) fn centroid_error(square: f32, is_pht: bool) -> f32 {
     square * if is_pht { 0.4 } else { 0.65 }
+}
+
+/// The prior error of a triangle divided by `n`, by what its nodes say, and by what would be guessed of it as a whole: nodes may have
+/// missed something, the less likely the more there are.
+pub(super) fn curved_error(guess: f32, n: u32, error: f32) -> f32 {
+    let missed = (guess - ERROR_FLOOR) * CURVED_GUESS / n.pow(3) as f32;
+    ERROR_FLOOR + error.max(missed)
 }
 
 /// Expected squared difference between two codes, in squared codes, when the two colours differ by a mean square of `error` before they
@@ -141,7 +138,8 @@ impl RootRanking<'_> {
         let planting = self.planting_cost(root.pixels);
         let splitting = planting + split_cost(pixels, 3, self.lights);
         let split = SPLIT_YIELD * benefit * (15.0 / 16.0) / splitting;
-        if split > shade {
+        // What is curved already would not gain by linear parts.
+        if split > shade && !root.is_curved {
             (CURIOSITY * split, Action::Split(7))
         } else {
             (shade, Action::Shade)

@@ -19,6 +19,7 @@ use crate::geometry::{Bary, Quadratic};
 use crate::highlight;
 use crate::illumination::{ActiveLights, ShadingKit, shade_few};
 use crate::refine::LeafId;
+use crate::refine::estimate::squared_codes;
 use crate::schedule::cost;
 
 /// Pixels with a mean squared error below this, in squared codes, are shaded in a single step.
@@ -31,6 +32,10 @@ const STEPS_FROM: f32 = 1.2;
 const POINTS: usize = 6 + SAMPLE_WEIGHTS.len();
 
 /// Which terms have to be evaluated at the pixels of a root.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "most roots that anything is known of are shaded"
+)]
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shading {
     /// None: interpolation is proved to be right.
@@ -115,7 +120,7 @@ impl Polish {
 }
 
 /// How many lights the first step evaluates at a pixel as a rule.
-pub(super) fn usual_lights(lights: usize) -> usize {
+pub(in crate::frame) fn usual_lights(lights: usize) -> usize {
     lights.min(1 + lights / 8)
 }
 
@@ -328,7 +333,8 @@ fn pixel_shading(
     let [n, m, o, ..] = normals;
     let exact = shade_few(level, &kit, &bounds.active, &[p, q, r], &[n, m, o]);
     let pixels = root.pixels as f32;
-    let costs = [bounds.active, bounds.rough].map(|lights| cost::phong(pixels, lights.diffuse.len()));
+    let costs =
+        [bounds.active, bounds.rough].map(|lights| cost::phong(pixels, lights.diffuse.len()));
     let first = (costs[0] > STEPS_FROM * costs[1]).then(|| {
         let rough = shade_few(level, &kit, &bounds.rough, &points, &normals);
         let rest: [[f32; 3]; POINTS] = std::array::from_fn(|i| minus(full[i], rough[i]));
@@ -336,7 +342,7 @@ fn pixel_shading(
         let rest = Quadratic::through([a, b, c], [ab, bc, ca]);
         let squares = tests.iter().enumerate().map(|(i, &test)| {
             let off = minus(rest.at(SAMPLE_WEIGHTS[i]), test);
-            ranking::squared_codes(stage.view.encoding, full[6 + i], off)
+            squared_codes(stage.view.encoding, full[6 + i], off)
         });
         FirstStep {
             rough: bounds.rough,

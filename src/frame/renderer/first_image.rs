@@ -168,8 +168,10 @@ impl Renderer {
         if !picture.prepare(&mut studio, allowance) || !allowance.completes_image() {
             return false;
         }
+        picture.curve(&mut studio, allowance, handing_over_ms);
+        let curves = picture.curves();
         if is_shown {
-            let ending_ms = studio.colouring_ms(&view) + handing_over_ms;
+            let ending_ms = studio.colouring_ms(&view, curves.load) + handing_over_ms;
             let slowness = studio.stages.slowness(studio.predicted);
             let has_time = allowance.has_time_for(ending_ms * slowness);
             if !(is_colouring_due || has_time) || !picture.colour(&mut studio, allowance, true) {
@@ -183,6 +185,7 @@ impl Renderer {
                 return false;
             }
         }
+        curves.book(allowance);
         picture.begin_refinement(&mut studio, allowance);
         self.shelf.publish(size);
         allowance.note_image();

@@ -169,7 +169,8 @@ fn expected(exec: Exec, image: &Image, method: Method) -> Vec<Expected> {
                 let planting = cost::leaves(1.0, 1.5, lights) + samples;
                 let split = planting + cost::leaves(4.0, 1.5, lights) + cost::repaint(4.0, area);
                 let benefit = area * prior;
-                let shade = benefit / cost::phong(area, lights);
+                // The first step of shading evaluates about one light in eight.
+                let shade = benefit / cost::phong(area, lights.min(1 + lights / 8));
                 let split = 0.5 * benefit * (15.0 / 16.0) / split;
                 if split > shade { 4.0 * split } else { shade }
             }
