@@ -123,7 +123,7 @@ fn a_sweep_writes_charts_and_a_document_of_all_it_has_measured() {
     assert!(svg.starts_with("<svg "), "{svg}");
     let progressive = specula::Method::ALL
         .into_iter()
-        .filter(|method| method.is_progressive());
+        .filter(|method| method.has_a_curve());
     assert_eq!(count_tags(&svg, "polyline"), progressive.count());
 
     // The file of comma-separated values has as many fields in each row as columns.

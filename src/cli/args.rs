@@ -7,6 +7,7 @@ use specula::frame::{Engine, EngineOptions, Method};
 use specula::geometry::screen::MAX_IMAGE_SIDE;
 use specula::output::Encoding;
 use specula::output::timing::MAX_DURATION_S;
+use specula::refine::paper::PaperRule;
 use specula::scene::Scene;
 use specula::schedule::{Budget, CostModel};
 use specula::simd::SimdLevel;
@@ -90,6 +91,44 @@ impl Machine {
     pub(super) fn simd_level(&self) -> SimdLevel {
         self.simd.unwrap_or_else(SimdLevel::detect)
     }
+}
+
+/// How far the paper's methods go.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Paper {
+    /// For the method regular: how many rings of neighbours are subdivided with a highlighted triangle
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "1",
+        help_heading = "Methods of the paper"
+    )]
+    rings: u32,
+
+    /// For the method regular: triangles are split until they have fewer pixels
+    #[arg(long, value_name = "PX", default_value = "32", value_parser = threshold, help_heading = "Methods of the paper")]
+    area_threshold: f32,
+
+    /// For the method highlight: an edge is divided where the intensity in its middle is off by more than this share
+    #[arg(long, value_name = "SHARE", default_value = "0.3", value_parser = threshold, help_heading = "Methods of the paper")]
+    intensity_threshold: f32,
+}
+
+impl Paper {
+    pub(super) fn rule(self) -> PaperRule {
+        PaperRule {
+            rings: self.rings,
+            area_px: self.area_threshold,
+            difference: self.intensity_threshold,
+            ..PaperRule::default()
+        }
+    }
+}
+
+fn threshold(text: &str) -> Result<f32, String> {
+    let value = not_negative(text).filter(|&value| value > 0.0);
+    let value = value.map(|value| value as f32);
+    value.ok_or_else(|| "a threshold is a number above 0".to_owned())
 }
 
 /// An image size in pixels, not empty and not too large.

@@ -1,6 +1,6 @@
 //! `specula bench`: frame times over views from all around a scene.
 
-use super::args::{Machine, budget, count, milliseconds, name_of};
+use super::args::{Machine, Paper, budget, count, milliseconds, name_of};
 use super::console::{Output, Progress, note};
 use super::report::list;
 use super::{Failure, costs};
@@ -48,7 +48,7 @@ pub(super) struct Bench {
     #[arg(long, value_name = "N", default_value = "60", value_parser = limited_count)]
     views: u32,
 
-    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles or phong-half
+    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles, phong-half, regular, highlight or hybrid
     #[arg(long, default_value_t)]
     method: Method,
 
@@ -81,6 +81,9 @@ pub(super) struct Bench {
     json: bool,
 
     #[command(flatten)]
+    paper: Paper,
+
+    #[command(flatten)]
     machine: Machine,
 }
 
@@ -100,6 +103,7 @@ pub(super) fn run(args: &Bench) -> Result<(), Failure> {
         width: args.machine.size.width,
         height: args.machine.size.height,
         method: args.method,
+        paper: args.paper.rule(),
         budget: budget(args.budget, args.work),
         views: args.views,
         repeats: args.repeat,

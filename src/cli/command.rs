@@ -5,6 +5,7 @@ use super::animate::{self, Animate};
 use super::bench::{self, Bench};
 use super::compare::{self, Compare};
 use super::inspect::{self, Inspect};
+use super::paper::{self, Experiment};
 use super::render::{self, Render};
 use super::soak::{self, Soak};
 use super::sweep::{self, Sweep};
@@ -21,6 +22,7 @@ Examples:
   specula sweep scenes/teapot.ron --methods all --repeat 9 --svg teapot.svg
   specula compare scenes/closeup.ron -o sheet.png
   specula bench scenes/teapot.ron --budget 4
+  specula paper
   specula soak --frames 3000 --csv soak.csv
   specula inspect scenes/teapot.ron --budget 2 --overlay overlay.png
 
@@ -43,6 +45,8 @@ enum Command {
     Compare(Compare),
     /// Measure frame times over views from all around a scene
     Bench(Bench),
+    /// Repeat the experiment of the paper that this builds on, and print its tables beside ours
+    Paper(Experiment),
     /// Count late frames: many budgets before a moving camera, beside an engine that only waits
     Soak(Soak),
     /// Say what a view consists of, and draw it over the image
@@ -58,6 +62,7 @@ impl Arguments {
             Command::Sweep(args) => sweep::run(args),
             Command::Compare(args) => compare::run(args),
             Command::Bench(args) => bench::run(args),
+            Command::Paper(args) => paper::run(args),
             Command::Soak(args) => soak::run(args),
             Command::Inspect(args) => inspect::run(args),
         }

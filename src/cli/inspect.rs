@@ -76,7 +76,7 @@ pub(super) struct Inspect {
     #[arg(long, value_name = "N", default_value = "1", value_parser = count)]
     frames: u32,
 
-    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles or phong-half
+    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles, phong-half, regular, highlight or hybrid
     #[arg(long, default_value_t)]
     method: Method,
 

@@ -14,6 +14,7 @@ mod csv;
 mod inspect;
 mod log;
 mod machine;
+mod paper;
 mod render;
 mod report;
 mod soak;

@@ -1,6 +1,8 @@
 //! `specula render`: frames of a still view under a budget.
 
-use super::args::{Machine, budget, count, milliseconds, name_of, require_png, rmse, size, time};
+use super::args::{
+    Machine, Paper, budget, count, milliseconds, name_of, require_png, rmse, size, time,
+};
 use super::console::{Output, Progress, note};
 use super::log::{Log, LoggedFrame, checksum};
 use super::report::FrameReport;
@@ -78,7 +80,7 @@ pub(super) struct Render {
     #[arg(long, value_name = "N", default_value = "1", value_parser = count)]
     frames: u32,
 
-    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles or phong-half
+    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles, phong-half, regular, highlight or hybrid
     #[arg(long, default_value_t)]
     method: Method,
 
@@ -93,6 +95,9 @@ pub(super) struct Render {
     /// Print one JSON object per frame
     #[arg(long)]
     json: bool,
+
+    #[command(flatten)]
+    paper: Paper,
 
     #[command(flatten)]
     machine: Machine,
@@ -229,6 +234,7 @@ impl Run {
     fn options(&self, args: &Render) -> Result<EngineOptions, Failure> {
         Ok(EngineOptions {
             backend: self.backend,
+            paper: args.paper.rule(),
             ..args.machine.options(self.method, self.encoding)?
         })
     }

@@ -11,6 +11,7 @@ use crate::clock::Clock;
 use crate::geometry::screen::MAX_IMAGE_SIDE;
 use crate::output::{Encoding, Frame, Rect, Target};
 use crate::parallel::Exec;
+use crate::refine::paper::PaperRule;
 use crate::scene::{Scene, World};
 use crate::schedule::{Allowance, Budget, CancelToken, CostModel};
 use crate::simd::SimdLevel;
@@ -91,13 +92,15 @@ impl Engine {
             (None, Some(sibling)) => calibrate(exec, pool.as_deref(), &*options.clock, sibling),
             _ => CostModel::default(),
         };
+        let mut renderer = Renderer::new(scene, backend, options.method, options.encoding, costs);
+        renderer.paper = options.paper;
         Ok(Self {
             clock: options.clock,
             exec,
             pool,
             overrun: options.overrun,
             cancel: options.cancel,
-            renderer: Renderer::new(scene, backend, options.method, options.encoding, costs),
+            renderer,
         })
     }
 
@@ -219,6 +222,12 @@ impl Engine {
         self.renderer.handover.changed()
     }
 
+    /// Changes how far the paper's methods go. The current image is forgotten.
+    pub fn set_paper_rule(&mut self, rule: PaperRule) {
+        self.renderer.paper = rule;
+        self.forget();
+    }
+
     /// What the engine has learned about the time that work takes. An engine of the same kind that
     /// [starts from it](EngineOptions::costs) need not find out again.
     #[must_use]
@@ -241,8 +250,12 @@ impl Engine {
                 base,
                 backend,
                 refinement,
+                baseline,
                 ..
             } = picture;
+            if method.is_of_the_paper() {
+                return baseline.for_each_leaf(world, base, &**backend, f);
+            }
             let method = picture.shown_method(*method);
             for_each_leaf(method, world, base, &**backend, refinement, f);
         }

@@ -22,6 +22,14 @@ pub enum Method {
     /// Gouraud first, then per-pixel Phong, squares of the image in a fixed shuffled order: a rival of
     /// [`Adaptive`](Self::Adaptive) that knows nothing of the scene.
     PhongTiles,
+    /// The paper's regular subdivision (section 3.2): potentially highlighted triangles, and neighbours of theirs, are split in four until the
+    /// parts are small. A frame does all of it, whatever its budget.
+    Regular,
+    /// The paper's highlight subdivision (section 3.1): potentially highlighted triangles are divided at the centres of their highlights. A
+    /// frame does all of it, whatever its budget.
+    Highlight,
+    /// Potentially highlighted triangles shaded per pixel (the paper's section 3.3). A frame does all of it, whatever its budget.
+    Hybrid,
     /// The illumination equation at every pixel of an image of half the width and height, which is enlarged: the simple rival
     /// that is there in a quarter of the time.
     PhongHalf,
@@ -29,7 +37,7 @@ pub enum Method {
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 10] = [
         Self::Flat,
         Self::Gouraud,
         Self::Phong,
@@ -37,6 +45,9 @@ impl Method {
         Self::PhongArea,
         Self::PhongTiles,
         Self::PhongHalf,
+        Self::Regular,
+        Self::Highlight,
+        Self::Hybrid,
     ];
 
     /// The name used on the command line and in reports.
@@ -50,6 +61,9 @@ impl Method {
             Self::PhongArea => "phong-area",
             Self::PhongTiles => "phong-tiles",
             Self::PhongHalf => "phong-half",
+            Self::Regular => "regular",
+            Self::Highlight => "highlight",
+            Self::Hybrid => "hybrid",
         }
     }
 
@@ -63,6 +77,18 @@ impl Method {
     #[must_use]
     pub fn shades_first_image_per_pixel(self) -> bool {
         matches!(self, Self::Phong | Self::PhongHalf)
+    }
+
+    /// Whether it is one of the paper's: Gouraud shading, then everything that is to be done about highlights at once.
+    #[must_use]
+    pub fn is_of_the_paper(self) -> bool {
+        matches!(self, Self::Regular | Self::Highlight | Self::Hybrid)
+    }
+
+    /// Whether there are several images of it between Gouraud shading and its best: by budgets, or by thresholds.
+    #[must_use]
+    pub fn has_a_curve(self) -> bool {
+        self.is_progressive() || matches!(self, Self::Regular | Self::Highlight)
     }
 
     /// Whether refinement takes triangles one by one, best first.

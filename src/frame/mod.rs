@@ -10,11 +10,12 @@
 //! | `picture.rs` | an image in the making, stage by stage, each of which may be interrupted |
 //! | `motion.rs` | which triangles have moved since a picture was drawn |
 //! | `base.rs`, `curves.rs` | what the stages of a first image do |
-//! | `refinement/` | makes it better; `refine_first.rs` is how, where the backend cannot repaint, `tiles.rs` is a simple rival |
+//! | `refinement/` | makes it better; `refine_first.rs` is how, where the backend cannot repaint, `tiles.rs` is a simple rival, `baseline.rs` the paper's methods |
 //! | `handover.rs` | brings the caller's frame up to date |
 //! | `load.rs`, `calibration.rs` | how much work a first image is, and what work takes on this machine |
 
 mod base;
+mod baseline;
 mod calibration;
 mod curves;
 mod engine;

@@ -4,6 +4,7 @@ use super::Method;
 use crate::backend::{Backend, BackendKind};
 use crate::clock::{Clock, SystemClock};
 use crate::output::Encoding;
+use crate::refine::paper::PaperRule;
 use crate::schedule::{CancelToken, CostModel};
 use crate::simd::SimdLevel;
 use std::sync::Arc;
@@ -13,6 +14,8 @@ use std::sync::Arc;
 pub struct EngineOptions {
     /// How images are shaded.
     pub method: Method,
+    /// How far the paper's methods go, if it is one of them.
+    pub paper: PaperRule,
     /// What draws them; [`Engine::with_backend`](super::Engine::with_backend) takes one that is not among these.
     pub backend: BackendKind,
     /// How images store light.
@@ -51,6 +54,7 @@ impl Default for EngineOptions {
     fn default() -> Self {
         Self {
             method: Method::default(),
+            paper: PaperRule::default(),
             backend: BackendKind::default(),
             encoding: Encoding::default(),
             threads: None,
@@ -116,6 +120,10 @@ pub(super) fn suits(method: Method, backend: &dyn Backend) -> bool {
     match method {
         Method::Flat | Method::Gouraud | Method::Adaptive => true,
         Method::Phong | Method::PhongHalf => capabilities.per_pixel,
-        Method::PhongArea | Method::PhongTiles => capabilities.refines_in_place(),
+        Method::PhongArea
+        | Method::PhongTiles
+        | Method::Regular
+        | Method::Highlight
+        | Method::Hybrid => capabilities.refines_in_place(),
     }
 }

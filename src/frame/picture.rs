@@ -21,6 +21,7 @@ pub(super) use refining::Easel;
 
 use super::Method;
 use super::base::BaseImage;
+use super::baseline::Baseline;
 use super::curves::{self, CurvedLoad, Curves};
 use super::load::ImageLoad;
 use super::motion::Motion;
@@ -30,6 +31,7 @@ use super::stats::{FrameStats, StageTimes};
 use super::tiles::Tiles;
 use crate::backend::Backend;
 use crate::parallel::{Exec, GoOn, Turn};
+use crate::refine::paper::PaperRule;
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, CostModel, Kind, Load};
 use crate::visibility::Culler;
@@ -56,6 +58,8 @@ pub(super) struct Picture {
     pub(super) refine_first: RefineFirst,
     /// For [`Method::PhongTiles`].
     tiles: Tiles,
+    /// For the paper's methods.
+    pub(super) baseline: Baseline,
     /// What it shows, or will when it is done.
     view: Option<View>,
     /// One pixel stands for `divisor` by `divisor` pixels of the target.
@@ -80,6 +84,7 @@ pub(super) struct Picture {
 pub(super) struct Studio<'a> {
     pub(super) exec: Exec,
     pub(super) method: Method,
+    pub(super) paper: PaperRule,
     pub(super) world: &'a World,
     pub(super) culler: &'a mut Culler,
     pub(super) costs: &'a mut CostModel,
@@ -113,6 +118,7 @@ impl Picture {
             refinement: Refinement::default(),
             refine_first: RefineFirst::default(),
             tiles: Tiles::default(),
+            baseline: Baseline::default(),
             view: None,
             divisor: 1,
             pass: Pass::Empty,
@@ -223,6 +229,9 @@ impl Picture {
         self.refinement.report(method, stats);
         if method == Method::PhongTiles {
             self.tiles.report(stats);
+        }
+        if method.is_of_the_paper() {
+            self.baseline.report(stats);
         }
     }
 

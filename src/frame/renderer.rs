@@ -12,6 +12,7 @@ use crate::backend::Backend;
 use crate::geometry::screen::MAX_IMAGE_SIDE;
 use crate::output::{Encoding, Target};
 use crate::parallel::Exec;
+use crate::refine::paper::PaperRule;
 use crate::scene::{GeometryChange, Placement, Scene, View, World};
 use crate::schedule::{Allowance, Budget, CostModel, Ladder, cost};
 use crate::visibility::Culler;
@@ -24,6 +25,7 @@ const LEAST_NS_TO_SHARE: f32 = 100_000.0;
 #[derive(Debug)]
 pub(super) struct Renderer {
     pub(super) method: Method,
+    pub(super) paper: PaperRule,
     pub(super) encoding: Encoding,
     placement: Placement,
     pub(super) world: World,
@@ -74,6 +76,7 @@ impl Renderer {
         let (placement, world) = Placement::new(scene);
         Self {
             method,
+            paper: PaperRule::default(),
             encoding,
             placement,
             culler: Culler::new(&world.clusters),

@@ -20,6 +20,7 @@ use crate::backend::BackendKind;
 use crate::clock::{Clock, SystemClock};
 use crate::frame::{Engine, EngineError, EngineOptions, FrameStats, Method, Overrun, StageTimes};
 use crate::output::{Encoding, Frame};
+use crate::refine::paper::PaperRule;
 use crate::scene::{Camera, Scene};
 use crate::schedule::{Budget, CostModel};
 use crate::simd::SimdLevel;
@@ -37,6 +38,8 @@ pub struct BenchOptions {
     pub height: u32,
     /// How images are shaded.
     pub method: Method,
+    /// How far the paper's methods go.
+    pub paper: PaperRule,
     /// What each frame may cost.
     pub budget: Budget,
     /// Views around the scene; zero counts as one.
@@ -65,6 +68,7 @@ impl Default for BenchOptions {
             width: 1280,
             height: 720,
             method: Method::default(),
+            paper: PaperRule::default(),
             budget: Budget::Unlimited,
             views: 60,
             repeats: 1,
@@ -167,6 +171,8 @@ pub struct BenchReport {
     pub triangles_visible: f64,
     /// Mean number of triangles subdivided.
     pub triangles_subdivided: f64,
+    /// Mean number of parts that they were divided into, as far as those are still interpolated.
+    pub leaves: f64,
     /// Mean number of potentially highlighted triangles that own a pixel.
     pub pht_visible: f64,
     /// Mean number of pixels shaded by the illumination equation in refinement.
@@ -196,6 +202,7 @@ pub fn bench(
         scene,
         EngineOptions {
             method: options.method,
+            paper: options.paper,
             threads: options.threads,
             backend: options.backend,
             encoding: options.encoding,
@@ -311,6 +318,7 @@ struct Totals {
     triangles_drawn: u64,
     triangles_visible: u64,
     triangles_subdivided: u64,
+    leaves: u64,
     pht_visible: u64,
     phong_pixels: u64,
 }
@@ -324,6 +332,7 @@ impl Totals {
         self.triangles_drawn += stats.triangles_drawn;
         self.triangles_visible += stats.triangles_visible;
         self.triangles_subdivided += stats.triangles_subdivided;
+        self.leaves += stats.leaves;
         self.pht_visible += stats.pht_visible;
         self.phong_pixels += stats.phong_pixels;
     }
@@ -372,6 +381,7 @@ impl Totals {
             triangles_drawn: mean(self.triangles_drawn),
             triangles_visible: mean(self.triangles_visible),
             triangles_subdivided: mean(self.triangles_subdivided),
+            leaves: mean(self.leaves),
             pht_visible: mean(self.pht_visible),
             phong_pixels: mean(self.phong_pixels),
             compared_views: 0,

@@ -31,6 +31,7 @@
 mod curving;
 pub mod estimate;
 mod forest;
+pub mod paper;
 mod shown;
 mod split;
 mod vertices;

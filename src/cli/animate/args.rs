@@ -68,7 +68,7 @@ pub(in crate::cli) struct Animate {
     #[arg(long, value_name = "UNITS", conflicts_with = "budget")]
     pub(super) work: Option<u64>,
 
-    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles or phong-half
+    /// How to shade: flat, gouraud, phong, adaptive, phong-area, phong-tiles, phong-half, regular, highlight or hybrid
     #[arg(long, default_value_t)]
     pub(super) method: Method,
 

@@ -32,7 +32,7 @@ pub(in crate::cli) struct Compare {
     #[arg(short, long, value_name = "OUT.png")]
     pub(super) output: PathBuf,
 
-    /// Methods, separated by commas: flat, gouraud, phong, adaptive, phong-area, phong-tiles, phong-half, or all
+    /// Methods, separated by commas: flat, gouraud, phong, adaptive, phong-area, phong-tiles, phong-half, regular, highlight, hybrid, or all
     #[arg(
         long,
         value_name = "LIST",

@@ -32,7 +32,7 @@ pub(in crate::cli) struct Sweep {
     #[arg(required = true, value_name = "SCENE")]
     pub(super) scenes: Vec<PathBuf>,
 
-    /// Methods, separated by commas: flat, gouraud, phong, adaptive, phong-area, phong-tiles, phong-half, or all
+    /// Methods, separated by commas: flat, gouraud, phong, adaptive, phong-area, phong-tiles, phong-half, regular, highlight, hybrid, or all
     #[arg(
         long,
         value_name = "LIST",

@@ -186,7 +186,7 @@ impl<'a> Chart<'a> {
                     plot.map_coordinate(&(self.x.clamp(point.frame_ms), self.y.clamp(point.rmse)))
                 })
                 .collect();
-            if curve.is_progressive {
+            if curve.has_a_curve {
                 let style = ShapeStyle::from(look.color).stroke_width(3);
                 canvas.draw(&PathElement::new(points.clone(), style))?;
             }
@@ -210,7 +210,7 @@ impl<'a> Chart<'a> {
         }
         for curve in &self.curves {
             let look = Look::of(curve.method);
-            if curve.is_progressive {
+            if curve.has_a_curve {
                 canvas.draw(&line([left, y], [left + 36, y], 3, look.color))?;
             }
             draw_mark(canvas, look, (left + 18, y))?;
@@ -296,6 +296,7 @@ mod tests {
             method: method.name(),
             budget_ms: frame_ms,
             fraction: None,
+            threshold: None,
             frame: 1,
             frame_ms,
             overshoot_ms: 0.0,
@@ -337,7 +338,7 @@ mod tests {
         let count = |pattern: &str| svg.matches(pattern).count();
         let progressive = Method::ALL
             .iter()
-            .filter(|method| method.is_progressive())
+            .filter(|method| method.has_a_curve())
             .count();
         assert_eq!(count("<polyline"), progressive);
         // Each mark has a rim, and there is another one in the legend.

@@ -51,10 +51,11 @@ impl Look {
             "gouraud" => gray(0x70, Shape::Square),
             "phong" => gray(0x20, Shape::Disc),
             "phong-half" => gray(0x50, Shape::Diamond),
+            "hybrid" => gray(0x90, Shape::TurnedTriangle),
             _ => {
                 let mut colored = Method::ALL
                     .into_iter()
-                    .filter(|method| method.is_progressive());
+                    .filter(|method| method.has_a_curve());
                 let index = colored
                     .position(|other| other.name() == method)
                     .unwrap_or(0);

@@ -2,12 +2,13 @@
 
 use super::{Picture, Studio};
 use crate::frame::Method;
+use crate::frame::baseline::Canvas;
 use crate::frame::load;
 use crate::frame::refinement::Stage;
 use crate::frame::stats::StageTimes;
 use crate::output::Target;
 use crate::parallel::Exec;
-use crate::scene::World;
+use crate::scene::{View, World};
 use crate::schedule::{Allowance, CostModel, Kind, Load};
 
 /// What refining needs besides the picture itself.
@@ -118,6 +119,10 @@ impl Picture {
         let Some(view) = self.view else {
             return;
         };
+        if studio.method.is_of_the_paper() {
+            self.refinement.clear();
+            return self.draw_baseline(studio, allowance, &view);
+        }
         let since = allowance.elapsed_ms();
         if studio.method == Method::PhongTiles {
             self.tiles.begin(&view, &*self.backend);
@@ -131,5 +136,24 @@ impl Picture {
             self.refinement.clear();
         }
         studio.stages.classify += allowance.elapsed_ms() - since;
+    }
+
+    /// Does what the paper's methods do after Gouraud shading.
+    fn draw_baseline(&mut self, studio: &mut Studio<'_>, allowance: &Allowance<'_>, view: &View) {
+        let begin_ms = allowance.elapsed_ms();
+        let mut canvas = Canvas {
+            exec: studio.exec,
+            world: studio.world,
+            view,
+            base: &self.base,
+            backend: &mut *self.backend,
+        };
+        self.baseline
+            .classify(studio.method, &studio.paper, &canvas);
+        let classified_ms = allowance.elapsed_ms();
+        self.baseline
+            .draw(studio.method, &studio.paper, &mut canvas);
+        studio.stages.classify += classified_ms - begin_ms;
+        studio.stages.refine += allowance.elapsed_ms() - classified_ms;
     }
 }

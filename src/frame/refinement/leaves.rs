@@ -54,7 +54,7 @@ pub struct Leaf {
 
 impl Leaf {
     /// A whole triangle.
-    fn root(triangle: u32, colours: [[f32; 3]; 3], pixels: u32) -> Self {
+    pub(in crate::frame) fn root(triangle: u32, colours: [[f32; 3]; 3], pixels: u32) -> Self {
         Self {
             triangle,
             corners: Bary::ROOT,

@@ -379,6 +379,7 @@ impl Refinement {
     pub(super) fn report(&self, method: Method, stats: &mut FrameStats) {
         stats.estimated_error = match method {
             Method::Flat | Method::Gouraud => f64::NAN,
+            method if method.is_of_the_paper() => f64::NAN,
             _ => self.estimated_error(),
         };
         stats.pht = self.counters.phts;

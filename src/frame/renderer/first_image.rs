@@ -158,6 +158,7 @@ impl Renderer {
         let mut studio = Studio {
             exec: *exec,
             method: self.method,
+            paper: self.paper,
             world: &self.world,
             culler: &mut self.culler,
             costs: &mut self.costs,

@@ -5,6 +5,8 @@
 //! by `P - G`: it is the mean RMSE, in codes, over all budgets between the two. Until a method has an image the error is
 //! that of Gouraud shading, which could be had by then; after the last measurement it stays what it was.
 //!
+//! The paper's methods have no budget, but thresholds: their points are the images that these give, each after the time that it took.
+//!
 //! By this measure Gouraud and Phong shading themselves come out alike: at a budget short of `P` there is no Phong image.
 
 use super::{Calibration, SweepRow};
@@ -16,8 +18,8 @@ use serde::Serialize;
 pub struct Curve {
     /// The method's name.
     pub method: &'static str,
-    /// Whether budgets make a difference; else there is one point, that of the median frame time.
-    pub is_progressive: bool,
+    /// Whether budgets or thresholds make a difference; else there is one point, that of the median frame time.
+    pub has_a_curve: bool,
     /// In order of time.
     pub points: Vec<CurvePoint>,
 }
@@ -57,10 +59,7 @@ impl Curve {
                 Some(curve) => curve.points.push(point),
                 None => curves.push(Self {
                     method: row.method,
-                    is_progressive: row
-                        .method
-                        .parse::<Method>()
-                        .is_ok_and(Method::is_progressive),
+                    has_a_curve: row.method.parse::<Method>().is_ok_and(Method::has_a_curve),
                     points: vec![point],
                 }),
             }
@@ -69,7 +68,7 @@ impl Curve {
             curve
                 .points
                 .sort_by(|a, b| a.frame_ms.total_cmp(&b.frame_ms));
-            if !curve.is_progressive {
+            if !curve.has_a_curve {
                 let middle = (curve.points.len() - 1) / 2;
                 curve.points = vec![curve.points[middle]];
             }
@@ -142,7 +141,7 @@ mod tests {
     fn curve(points: &[(f64, f64)]) -> Curve {
         Curve {
             method: "adaptive",
-            is_progressive: true,
+            has_a_curve: true,
             points: points
                 .iter()
                 .map(|&(frame_ms, rmse)| CurvePoint { frame_ms, rmse })
@@ -209,6 +208,7 @@ mod tests {
                 method,
                 budget_ms: 1.0,
                 fraction: None,
+                threshold: None,
                 frame,
                 frame_ms,
                 overshoot_ms: 0.0,

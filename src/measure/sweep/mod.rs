@@ -8,12 +8,15 @@
 //! [medians](Calibration) of frames that alternate, so that a change of the machine's speed meets both. They are measured again
 //! during and after the sweep: the difference tells whether the machine was too [noisy](Noise).
 //!
+//! The paper's methods have no budgets but [thresholds]: at each budget they take the next finer one.
+//!
 //! Of several repetitions the row with the median frame time is kept whole, so that time and error belong together (of
 //! an even number, the faster of the two in the middle).
 
 mod calibration;
 mod curve;
 mod row;
+mod thresholds;
 
 pub use calibration::{Calibration, Noise};
 pub use curve::{Curve, CurveArea, CurvePoint};
@@ -126,6 +129,8 @@ pub struct Sweep<'a> {
     options: SweepOptions,
     /// One for each method, in order.
     engines: Vec<Engine>,
+    /// Of each of them, if it has one.
+    thresholds: Vec<Option<f64>>,
     reference: ReferenceImage,
     frame: Frame,
     calibrator: Option<Calibrator>,
@@ -157,6 +162,7 @@ impl<'a> Sweep<'a> {
             scene,
             reference: ReferenceImage::render(world, &view, gouraud.threads()),
             frame: Frame::new(options.width, options.height),
+            thresholds: vec![None; engines.len()],
             engines,
             options,
             calibrator: None,
@@ -213,8 +219,9 @@ impl<'a> Sweep<'a> {
         for method in 0..self.engines.len() {
             self.warm_up(method);
         }
-        for &budget in budgets {
+        for (step, &budget) in budgets.iter().enumerate() {
             for method in 0..self.engines.len() {
+                self.set_threshold(method, step, budgets.len());
                 for row in self.measure(method, budget) {
                     if on_row(row).is_break() {
                         return;
@@ -238,6 +245,7 @@ impl<'a> Sweep<'a> {
             self.warm_up(method);
         }
         for method in 0..self.engines.len() {
+            self.set_threshold(method, 0, 1);
             let mut images: Vec<(SweepRow, Frame)> = (0..self.options.repeats.max(1))
                 .map(|_| {
                     self.render(method, budget, Start::Cold);
@@ -250,6 +258,16 @@ impl<'a> Sweep<'a> {
             let (row, frame) = images.swap_remove(middle);
             on_image(row, frame);
         }
+    }
+
+    /// Gives a method of the paper its next threshold.
+    fn set_threshold(&mut self, method: usize, step: usize, steps: usize) {
+        let name = self.options.methods[method];
+        let threshold = thresholds::of_step(name, step, steps);
+        if name.is_of_the_paper() {
+            self.engines[method].set_paper_rule(thresholds::rule(name, threshold));
+        }
+        self.thresholds[method] = threshold;
     }
 
     /// The rows of one method at one budget, one for each frame.
@@ -311,6 +329,7 @@ impl<'a> Sweep<'a> {
             method: self.options.methods[method].name(),
             budget_ms: budget.millis,
             fraction: budget.fraction,
+            threshold: self.thresholds[method],
             frame: number,
             frame_ms: stats.frame_ms,
             overshoot_ms: stats.frame_ms - budget.millis,

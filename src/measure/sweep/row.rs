@@ -15,6 +15,8 @@ pub struct SweepRow {
     pub budget_ms: f64,
     /// The budget as a fraction of the way from Gouraud to Phong shading, if it was given so.
     pub fraction: Option<f64>,
+    /// The threshold of a method of the paper: pixels for `regular`, a share of intensity for `highlight`.
+    pub threshold: Option<f64>,
     /// The frame of the still view, counted from 1.
     pub frame: u32,
     /// How long the frame took.
@@ -33,7 +35,8 @@ pub struct SweepRow {
 impl SweepRow {
     /// Names of the columns of [`to_csv`](Self::to_csv).
     pub const CSV_HEADER: &'static str = "scene,method,budget_ms,fraction,frame,frame_ms,overshoot_ms,rmse,psnr_db,\
-        max,p99,share_above_1,share_above_4,triangles_subdivided,converged,covered_pixels,excluded_pixels";
+        max,p99,share_above_1,share_above_4,triangles_subdivided,converged,covered_pixels,excluded_pixels,\
+        threshold";
 
     /// The row as a line of comma-separated values, without a line end; what is infinite or not there is empty.
     #[must_use]
@@ -64,6 +67,7 @@ impl SweepRow {
             self.converged.to_string(),
             error.covered_pixels.to_string(),
             error.excluded_pixels.to_string(),
+            self.threshold.map_or_else(String::new, number),
         ]
         .join(",")
     }
@@ -80,6 +84,7 @@ mod tests {
             method: "phong",
             budget_ms: 2.0,
             fraction: None,
+            threshold: None,
             frame: 1,
             frame_ms: 2.5,
             overshoot_ms: 0.5,
