@@ -9,7 +9,8 @@
 //!
 //! **Phong.** Reflecting about a fixed `n` keeps angles; reflecting one vector about `n` and about `n'` gives results at most
 //! `2 ang(n, n')` apart, as two half-turns make a rotation by twice the angle of their axes. Hence the angle of `r` and `v` is that of the cones'
-//! axes within `beta_l + beta_v + 2 alpha`. And `r.v = 2 (n.l)(n.v) - l.v` gives the deviation.
+//! axes within `beta_l + beta_v + 2 alpha`. The greatest `r.v` comes from polynomials, too (module `quartic`), which is tighter where normals turn
+//! by much. And `r.v = 2 (n.l)(n.v) - l.v` gives the deviation.
 //!
 //! **Blinn-Phong.** If unit vectors `l`, `v` are within chords `e_l`, `e_v` of the axes `L`, `V`, then `l + v` is within `e_l + e_v` of `L + V`,
 //! so its direction turns by at most `asin((e_l + e_v) / |L + V|)`; no bound where that is not below 1 (light nearly opposite to
@@ -23,6 +24,7 @@
 
 use super::cone::{Angle, Directions, PAD, Varying, greatest, least};
 use super::power::{power_above, power_below};
+use super::quartic::greatest_reflection;
 use crate::illumination::power::FLUSH;
 use crate::illumination::reference::vector;
 use crate::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial};
@@ -132,7 +134,7 @@ impl TriangleBound {
 
     fn specular(&self, l: &Directions, n_l: &Varying) -> FactorBound {
         let (n, v, n_v) = (&self.normal, &self.to_viewer, &self.n_v);
-        let (lo, hi) = match self.model {
+        let (lo, mut hi) = match self.model {
             ReflectionModel::Phong => reflected_cone(l, n, v),
             ReflectionModel::BlinnPhong => halfway_cone(l, n, v),
         };
@@ -141,6 +143,13 @@ impl TriangleBound {
         }
         if is_flushed(hi, self.exponent) {
             return FLUSHED;
+        }
+        if self.model == ReflectionModel::Phong {
+            let padding = l.pad + v.pad + 2.0 * n.pad;
+            hi = hi.min(greatest_reflection(l, n, v) + padding);
+            if is_flushed(hi, self.exponent) {
+                return FLUSHED;
+            }
         }
         let l_v = Varying::cosine(l, v);
         let base = match self.model {

@@ -114,7 +114,8 @@ pub(super) struct Directions {
     pub(super) spread: Angle,
     /// Bound of the sum of weighted lengths over the length of the weighted sum; infinite when unknown.
     stretch: f64,
-    pad: f64,
+    /// Radians by which rounding may turn it.
+    pub(super) pad: f64,
 }
 
 impl Directions {
@@ -178,6 +179,13 @@ impl Directions {
             ]);
             greatest < -pad
         })
+    }
+
+    /// At the corners, with their lengths.
+    #[inline]
+    pub(super) fn vectors(&self) -> [DVec3; 3] {
+        let [a, b, c] = self.unit;
+        [a * self.length[0], b * self.length[1], c * self.length[2]]
     }
 
     fn wide(vectors: [DVec3; 3], length: [f64; 3]) -> Self {

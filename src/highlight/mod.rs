@@ -9,6 +9,7 @@ pub mod bound;
 mod cone;
 pub mod masks;
 mod power;
+mod quartic;
 pub mod signs;
 
 pub use bound::{FactorBound, LightBound, TriangleBound};

@@ -2,6 +2,7 @@
 //! worst point of each.
 
 mod cases;
+mod precision;
 mod search;
 
 use cases::{Case, Kind, Random, random_case};

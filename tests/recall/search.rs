@@ -167,9 +167,9 @@ impl Search<'_> {
         {
             *range = [range[0].min(value), range[1].max(value)];
         }
-        for term in 0..2 {
-            if off[term].abs() > found.deviation[term] {
-                found.deviation[term] = off[term].abs();
+        for (term, off) in off.into_iter().enumerate() {
+            if off.abs() > found.deviation[term] {
+                found.deviation[term] = off.abs();
                 found.points[term] = point;
             }
         }
