@@ -2,7 +2,7 @@
 //!
 //! * [`regular`] (section 3.2): potentially highlighted triangles and their neighbours are split in four until the parts are small on the
 //!   screen.
-//! * [`highlight`] (section 3.1): a vertex is put on the [centre](centre) of each highlight, and more of them on the edges that meet there.
+//! * [`highlight`] (section 3.1): a vertex is put on the [centre] of each highlight, and more of them on the edges that meet there.
 //!
 //! Each triangle is subdivided on its own, so T-junctions arise, and with them steps in colour; the paper has them, too. Parts never
 //! overlap and leave nothing out: corners are on the [grid](Bary) of the root's barycentric coordinates, to which a vertex that is
