@@ -8,7 +8,7 @@
 //! [medians](Calibration) of frames that alternate, so that a change of the machine's speed meets both. They are measured again
 //! during and after the sweep: the difference tells whether the machine was too [noisy](Noise).
 //!
-//! The paper's methods have no budgets but [thresholds]: at each budget they take the next finer one.
+//! The paper's methods have no budgets but thresholds: at each budget they take the next finer one.
 //!
 //! Of several repetitions the row with the median frame time is kept whole, so that time and error belong together (of
 //! an even number, the faster of the two in the middle).
