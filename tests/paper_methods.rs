@@ -219,6 +219,10 @@ fn what_makes_no_sense_is_refused_in_a_sentence() {
         ),
         (&["paper", "--size", "0x9"], "0x9"),
         (
+            &["paper", "--area-threshold", "-3"],
+            "a threshold is a number above 0",
+        ),
+        (
             &["paper", "--area-threshold", "0"],
             "a threshold is a number above 0",
         ),

@@ -106,11 +106,11 @@ pub(super) struct Paper {
     rings: u32,
 
     /// For the method regular: triangles are split until they have fewer pixels
-    #[arg(long, value_name = "PX", default_value = "32", value_parser = threshold, help_heading = "Methods of the paper")]
+    #[arg(long, value_name = "PX", default_value = "32", value_parser = threshold, allow_negative_numbers = true, help_heading = "Methods of the paper")]
     area_threshold: f32,
 
     /// For the method highlight: an edge is divided where the intensity in its middle is off by more than this share
-    #[arg(long, value_name = "SHARE", default_value = "0.3", value_parser = threshold, help_heading = "Methods of the paper")]
+    #[arg(long, value_name = "SHARE", default_value = "0.3", value_parser = threshold, allow_negative_numbers = true, help_heading = "Methods of the paper")]
     intensity_threshold: f32,
 }
 
