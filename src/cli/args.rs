@@ -105,7 +105,7 @@ pub(super) struct Paper {
     )]
     rings: u32,
 
-    /// For the method regular: triangles are split until they have fewer pixels
+    /// For the method regular: triangles are split until they have fewer pixels, but not below one
     #[arg(long, value_name = "PX", default_value = "32", value_parser = threshold, allow_negative_numbers = true, help_heading = "Methods of the paper")]
     area_threshold: f32,
 

@@ -6,10 +6,14 @@ use crate::geometry::Bary;
 /// Most levels: 16,384 parts.
 pub const MOST_LEVELS: u32 = 7;
 
-/// How often a triangle of that area on the screen, in pixels, is split in four: until the parts have less than `threshold_px`.
-/// An area that is not a number is none.
+/// Least area in pixels of what is split: parts between pixels would take memory and show nothing.
+pub const LEAST_PX: f32 = 1.0;
+
+/// How often a triangle of that area on the screen, in pixels, is split in four: until the parts have less than `threshold_px`, which counts
+/// as [`LEAST_PX`] if it is less or not a number. An area that is not a number is none.
 #[must_use]
 pub fn levels(area_px: f32, threshold_px: f32) -> u32 {
+    let threshold_px = threshold_px.max(LEAST_PX);
     let is_small = |&level: &u32| {
         let part = area_px / 4_f32.powi(level as i32);
         part < threshold_px || part.is_nan()
@@ -77,6 +81,8 @@ mod tests {
             (f32::NAN, 32.0, 0),
             (f32::INFINITY, 32.0, MOST_LEVELS),
             (100.0, f32::INFINITY, 0),
+            (100.0, 1e-6, 4),
+            (100.0, f32::NAN, 4),
         ] {
             assert_eq!(levels(area, threshold), want, "{area} {threshold}");
         }
