@@ -1,8 +1,10 @@
 //! Triangles, lights and eyes at random, most of them nasty.
 
 use glam::DVec3;
+use specula::highlight::{TriangleBound, TriangleLights, masks_of};
 use specula::illumination::reference::{towards_viewer, vector};
-use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial};
+use specula::output::Encoding;
+use specula::scene::{Eye, ReflectionModel, ShadingLight, ShadingMaterial, World};
 
 /// The generator `splitmix64`.
 pub(crate) struct Random(u64);
@@ -65,6 +67,36 @@ pub(crate) struct Case {
     pub(crate) eye: Eye,
     pub(crate) material: ShadingMaterial,
     pub(crate) lights: Vec<ShadingLight>,
+}
+
+impl Case {
+    /// A triangle of a world under all of its lights.
+    pub(crate) fn of_triangle(world: &World, eye: Eye, triangle: usize) -> Self {
+        let corners = world.triangles[triangle].map(|v| v as usize);
+        let material = usize::from(world.triangle_material[triangle]);
+        Self {
+            positions: corners.map(|v| world.positions.get(v)),
+            normals: corners.map(|v| world.normals.get(v)),
+            eye,
+            material: world.materials[material],
+            lights: world.lights.clone(),
+        }
+    }
+
+    pub(crate) fn bounds(&self) -> TriangleBound {
+        TriangleBound::new(self.positions, self.normals, &self.eye, &self.material)
+    }
+
+    pub(crate) fn masks(&self, encoding: Encoding) -> TriangleLights {
+        masks_of(
+            self.positions,
+            self.normals,
+            &self.eye,
+            encoding,
+            &self.material,
+            &self.lights,
+        )
+    }
 }
 
 /// What is nasty about a case.

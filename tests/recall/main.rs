@@ -8,7 +8,7 @@ mod search;
 use cases::{Case, Kind, Random, random_case};
 use rayon::prelude::*;
 use search::Worst;
-use specula::highlight::{LightBound, TriangleBound, TriangleLights, masks_of};
+use specula::highlight::{LightBound, TriangleLights};
 use specula::output::Encoding;
 use specula::scene::{Scene, ShadingLight, World};
 use std::fmt;
@@ -124,8 +124,7 @@ fn codes_off(
 /// Bounds and masks of a case with one light against the worst points found.
 fn check_case(case: &Case) -> Result<Tally, String> {
     let light = &case.lights[0];
-    let bound =
-        TriangleBound::new(case.positions, case.normals, &case.eye, &case.material).light(light);
+    let bound = case.bounds().light(light);
     let worst = search::worst(case, light, search::THOROUGH);
     check_factors(&bound, &worst)?;
     let mut tally = Tally {
@@ -137,14 +136,7 @@ fn check_case(case: &Case) -> Result<Tally, String> {
         tally.tight = tally.deviates;
     }
     for encoding in Encoding::ALL {
-        let lights = masks_of(
-            case.positions,
-            case.normals,
-            &case.eye,
-            encoding,
-            &case.material,
-            &case.lights,
-        );
+        let lights = case.masks(encoding);
         let codes = codes_off(case, light, &worst, &lights, encoding);
         if codes.is_nan() || codes > MOST_CODES {
             return Err(format!("{encoding}: {codes} codes off with {lights:?}"));
@@ -223,15 +215,7 @@ fn check_scene(scene: &Scene) -> Result<Tally, String> {
         .into_par_iter()
         .step_by(step)
         .map(|triangle| {
-            let corners = world.triangles[triangle].map(|v| v as usize);
-            let material = usize::from(world.triangle_material[triangle]);
-            let case = Case {
-                positions: corners.map(|v| world.positions.get(v)),
-                normals: corners.map(|v| world.normals.get(v)),
-                eye: view.eye,
-                material: world.materials[material],
-                lights: world.lights.clone(),
-            };
+            let case = Case::of_triangle(&world, view.eye, triangle);
             check_lights(&case).map_err(|what| format!("triangle {triangle}: {what}"))
         })
         .try_reduce(Tally::default, |a, b| Ok(a + b))
@@ -239,7 +223,7 @@ fn check_scene(scene: &Scene) -> Result<Tally, String> {
 
 /// Each light by its bounds, and what the masks leave out of all lights together, at points all over the triangle.
 fn check_lights(case: &Case) -> Result<Tally, String> {
-    let bounds = TriangleBound::new(case.positions, case.normals, &case.eye, &case.material);
+    let bounds = case.bounds();
     let mut tally = Tally::default();
     for (index, light) in case.lights.iter().enumerate() {
         let bound = bounds.light(light);
@@ -251,14 +235,7 @@ fn check_lights(case: &Case) -> Result<Tally, String> {
         tally.tight += usize::from(deviates && bound.specular.deviation < 4.0 * worst.deviation[1]);
     }
     for encoding in Encoding::ALL {
-        let lights = masks_of(
-            case.positions,
-            case.normals,
-            &case.eye,
-            encoding,
-            &case.material,
-            &case.lights,
-        );
+        let lights = case.masks(encoding);
         let codes = search::codes_off(case, &lights.active, encoding);
         if codes.is_nan() || codes > MOST_CODES {
             return Err(format!("{encoding}: {codes} codes off with {lights:?}"));

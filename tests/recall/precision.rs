@@ -5,7 +5,7 @@ use super::cases::Case;
 use super::search;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use specula::highlight::{SignBits, TriangleBound, compute_signs};
+use specula::highlight::{SignBits, compute_signs};
 use specula::measure::ReferenceImage;
 use specula::scene::{Camera, Scene, World};
 use specula::simd::SimdLevel;
@@ -73,18 +73,10 @@ fn count(world: &World, camera: &Camera) -> Counts {
     let mut counts = Counts::default();
     for triangle in visible {
         let vertices = world.triangles[triangle as usize];
-        let corners = vertices.map(|v| v as usize);
-        let material = usize::from(world.triangle_material[triangle as usize]);
-        let case = Case {
-            positions: corners.map(|v| world.positions.get(v)),
-            normals: corners.map(|v| world.normals.get(v)),
-            eye: view.eye,
-            material: world.materials[material],
-            lights: world.lights.clone(),
-        };
+        let case = Case::of_triangle(world, view.eye, triangle as usize);
         compute_signs(level, world, view.eye, &vertices, &mut bits);
         let pht = bits.pht_lights([0, 1, 2]);
-        let bounds = TriangleBound::new(case.positions, case.normals, &case.eye, &case.material);
+        let bounds = case.bounds();
         let mut any = [false; 3];
         for (index, light) in case.lights.iter().enumerate() {
             let brightest = (0..3)

@@ -31,6 +31,20 @@ struct Piece {
     hot: Option<usize>,
 }
 
+impl Piece {
+    /// Without the corner `k`, with a point in its place.
+    fn with_corner(&self, k: usize, point: Bary, colour: [f32; 3], hot: Option<usize>) -> Self {
+        let (mut corners, mut colours) = (self.corners, self.colours);
+        corners[k] = point;
+        colours[k] = colour;
+        Self {
+            corners,
+            colours,
+            hot,
+        }
+    }
+}
+
 /// Workspace for one triangle after the other.
 #[derive(Clone, Debug, Default)]
 pub struct HighlightSubdivision {
@@ -91,17 +105,7 @@ impl HighlightSubdivision {
         let colour = self.colours[0];
         self.next.clear();
         for piece in &self.pieces {
-            // Without the corner `k`, with the point in its place.
-            let replaced = |k: usize| {
-                let (mut corners, mut colours) = (piece.corners, piece.colours);
-                corners[k] = point;
-                colours[k] = colour;
-                Piece {
-                    corners,
-                    colours,
-                    hot: Some(k),
-                }
-            };
+            let replaced = |k: usize| piece.with_corner(k, point, colour, Some(k));
             let parts = [0, 1, 2].map(|k| Bary::doubled_area(replaced(k).corners));
             if parts.iter().any(|&area| area < 0) {
                 self.next.push(*piece);
@@ -178,17 +182,10 @@ fn divide(
     point: Bary,
     colour: [f32; 3],
 ) -> Option<[Piece; 2]> {
-    let replaced = |k: usize, hot: Option<usize>| {
-        let (mut corners, mut colours) = (piece.corners, piece.colours);
-        corners[k] = point;
-        colours[k] = colour;
-        Piece {
-            corners,
-            colours,
-            hot,
-        }
-    };
-    let halves = [replaced(other, Some(hot)), replaced(hot, None)];
+    let halves = [
+        piece.with_corner(other, point, colour, Some(hot)),
+        piece.with_corner(hot, point, colour, None),
+    ];
     let areas = halves.map(|half| Bary::doubled_area(half.corners));
     let whole = Bary::doubled_area(piece.corners);
     (areas.iter().all(|&area| area > 0) && areas[0] + areas[1] == whole).then_some(halves)
