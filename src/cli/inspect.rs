@@ -162,6 +162,8 @@ impl Report<'_> {
             "outcome": stats.outcome.name(),
             "converged": stats.converged,
             "estimated_error": stats.estimated_error,
+            "error_bound": stats.error_bound,
+            "unproved_share": stats.unproved_share,
             "skipped": stats
                 .skipped
                 .entries()

@@ -55,6 +55,8 @@ pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
         "divisor": stats.divisor,
         "converged": stats.converged,
         "estimated_error": stats.estimated_error,
+        "error_bound": stats.error_bound,
+        "unproved_share": stats.unproved_share,
         "triangles": stats.triangles,
         "triangles_drawn": stats.triangles_drawn,
         "triangles_visible": stats.triangles_visible,

@@ -235,6 +235,26 @@ impl Picture {
         }
     }
 
+    /// Fills in how far pixels of the image may be from per-pixel Phong shading, if it is one at full resolution.
+    pub(super) fn certify(&self, method: Method, stats: &mut FrameStats) {
+        if !self.backend.capabilities().refines_in_place() {
+            return;
+        }
+        let covered = stats.covered_pixels;
+        let known = match method {
+            _ if covered == 0 => Some((0, 0)),
+            Method::Phong => Some((1, 0)),
+            Method::Adaptive | Method::PhongArea => self.refinement.certified(),
+            Method::PhongTiles if self.tiles.is_finished() => Some((1, 0)),
+            Method::PhongTiles => Some((u8::MAX, covered.saturating_sub(stats.phong_pixels))),
+            _ => Some((u8::MAX, covered)),
+        };
+        if let Some((codes, unproved)) = known {
+            stats.error_bound = Some(f64::from(codes) / 255.0);
+            stats.unproved_share = Some(unproved as f64 / covered.max(1) as f64);
+        }
+    }
+
     /// Whether everything is drawn once, after refinement.
     pub(super) fn refines_first(&self, method: Method) -> bool {
         method.is_progressive() && !self.backend.capabilities().refines_in_place()

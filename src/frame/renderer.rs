@@ -291,6 +291,9 @@ impl Renderer {
                 stats.converged = is_current
                     && picture.has_converged(self.method)
                     && picture.divisor == self.method.divisor().unwrap_or(1);
+                if is_current && picture.divisor == 1 {
+                    picture.certify(self.method, &mut stats);
+                }
             }
         }
         stats

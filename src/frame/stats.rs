@@ -190,6 +190,14 @@ pub struct FrameStats {
     /// for [`Method::Phong`](super::Method::Phong). NaN for flat and Gouraud shading, where nothing is estimated, and while nothing is known yet. Where the budget ended before
     /// all visible triangles were looked at, over those that were.
     pub estimated_error: f64,
+    /// No pixel of the image is further from per-pixel Phong shading than this, per channel and as a share of full scale (a code is
+    /// 1/255), rounding to codes included: a proof where `estimated_error` is an estimate. It never grows while a still view is refined, and is
+    /// at most 1/255 when that has converged; 1, of which nothing follows, for methods that prove nothing. `None` where the image is not the
+    /// one asked for at full resolution (reduced, or stale), and on a backend with a coverage of its own. Pixels are excepted where the
+    /// illumination equation itself is in doubt within rounding: where a light just sets.
+    pub error_bound: Option<f64>,
+    /// Share of the covered pixels whose own bound is above a code; `None` like `error_bound`.
+    pub unproved_share: Option<f64>,
     /// Triangles of the scene; those of two-sided materials count twice, as fronts and as backs.
     pub triangles: u64,
     /// Triangles sent to the rasterizer's tiles for this image.
@@ -235,6 +243,8 @@ impl FrameStats {
             divisor: 1,
             record: FrameRecord::default(),
             estimated_error: f64::NAN,
+            error_bound: None,
+            unproved_share: None,
             triangles: 0,
             triangles_drawn: 0,
             triangles_visible: 0,

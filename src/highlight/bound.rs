@@ -22,7 +22,7 @@
 //!
 //! Nothing here depends on the machine: decisions are based on it.
 
-use super::cone::{Angle, Directions, PAD, Varying, greatest, least};
+use super::cone::{Angle, Directions, PAD, Quantity, Varying, greatest, least};
 use super::power::{power_above, power_below};
 use super::quartic::greatest_reflection;
 use crate::illumination::power::FLUSH;
@@ -43,7 +43,7 @@ pub struct FactorBound {
 
 impl FactorBound {
     /// All that is known of any factor.
-    const TRIVIAL: Self = Self {
+    pub(super) const TRIVIAL: Self = Self {
         lo: 0.0,
         hi: 1.0,
         deviation: 1.0,
@@ -123,7 +123,7 @@ impl TriangleBound {
             return LightBound::default();
         }
         LightBound {
-            diffuse: clamped(&n_l),
+            diffuse: clamped(&n_l.quantity(), kink(n_l.at)),
             specular: if self.specular {
                 self.specular(&to_light, &n_l)
             } else {
@@ -134,9 +134,10 @@ impl TriangleBound {
 
     fn specular(&self, l: &Directions, n_l: &Varying) -> FactorBound {
         let (n, v, n_v) = (&self.normal, &self.to_viewer, &self.n_v);
+        let [l_fan, n_fan, v_fan] = [l, n, v].map(|x| (x.axis, x.spread));
         let (lo, mut hi) = match self.model {
-            ReflectionModel::Phong => reflected_cone(l, n, v),
-            ReflectionModel::BlinnPhong => halfway_cone(l, n, v),
+            ReflectionModel::Phong => reflected_cone(l_fan, n_fan, v_fan),
+            ReflectionModel::BlinnPhong => halfway_cone(l_fan, n_fan, v_fan),
         };
         if hi <= 0.0 {
             return FactorBound::default();
@@ -156,7 +157,7 @@ impl TriangleBound {
             ReflectionModel::Phong => phong_base(lo, hi, n_l, n_v, &l_v),
             ReflectionModel::BlinnPhong => blinn_base(lo, hi, n_l, n_v, &l_v),
         };
-        power(&base, n_l, self.exponent)
+        power(&base.quantity(), n_l.lo > 0.0, self.exponent)
     }
 }
 
@@ -170,11 +171,15 @@ fn from_corners(to: DVec3, [a, b, c]: &[DVec3; 3]) -> [DVec3; 3] {
     [to - a, to - b, to - c]
 }
 
+/// How far the positive parts of corner values, interpolated, are at most from the positive part of what is interpolated between the
+/// values: nothing unless corners differ in sign.
+fn kink(at: [f64; 3]) -> f64 {
+    greatest(at).max(0.0).min((-least(at)).max(0.0))
+}
+
 /// The positive part.
-fn clamped(x: &Varying) -> FactorBound {
+pub(super) fn clamped(x: &Quantity, kink: f64) -> FactorBound {
     let (lo, hi) = (x.lo.max(0.0), x.hi.clamp(0.0, 1.0));
-    // Interpolating positive parts differs from the positive part of the interpolation where corners differ in sign.
-    let kink = greatest(x.at).max(0.0).min((-least(x.at)).max(0.0));
     FactorBound {
         lo: lo.min(hi),
         hi,
@@ -182,25 +187,28 @@ fn clamped(x: &Varying) -> FactorBound {
     }
 }
 
-/// Least and greatest `r.v` by the cones.
-fn reflected_cone(l: &Directions, n: &Directions, v: &Directions) -> (f64, f64) {
-    let reflected = n.axis * (2.0 * n.axis.dot(l.axis)) - l.axis;
-    let apart = Angle::from_cos(reflected.dot(v.axis));
-    let spread = l.spread.plus(v.spread).plus(n.spread).plus(n.spread);
+/// A cone: its axis and half-angle.
+type Cone = (DVec3, Angle);
+
+/// Least and greatest `r.v` by the cones of light, normal and viewer.
+pub(super) fn reflected_cone(l: Cone, n: Cone, v: Cone) -> (f64, f64) {
+    let reflected = n.0 * (2.0 * n.0.dot(l.0)) - l.0;
+    let apart = Angle::from_cos(reflected.dot(v.0));
+    let spread = l.1.plus(v.1).plus(n.1).plus(n.1);
     (apart.plus(spread).cos, apart.minus(spread).cos)
 }
 
-/// Least and greatest `n.h` by the cones.
-fn halfway_cone(l: &Directions, n: &Directions, v: &Directions) -> (f64, f64) {
-    let half = l.axis + v.axis;
+/// Least and greatest `n.h` by the cones of light, normal and viewer.
+pub(super) fn halfway_cone(l: Cone, n: Cone, v: Cone) -> (f64, f64) {
+    let half = l.0 + v.0;
     let per_length = 1.0 / half.length();
     // The chord of an angle is 2 sin(angle / 2).
     let chord = |angle: Angle| (2.0 - 2.0 * angle.cos).max(0.0).sqrt();
-    let turn = (chord(l.spread) + chord(v.spread)) * per_length;
+    let turn = (chord(l.1) + chord(v.1)) * per_length;
     // False for NaN too: opposite axes.
     if turn < 1.0 {
-        let apart = Angle::from_cos(n.axis.dot(half) * per_length);
-        let spread = Angle::from_sin(turn).plus(n.spread);
+        let apart = Angle::from_cos(n.0.dot(half) * per_length);
+        let spread = Angle::from_sin(turn).plus(n.1);
         (apart.plus(spread).cos, apart.minus(spread).cos)
     } else {
         (-1.0, 1.0)
@@ -210,14 +218,18 @@ fn halfway_cone(l: &Directions, n: &Directions, v: &Directions) -> (f64, f64) {
 /// `r.v`, given its interval by the cones.
 fn phong_base(lo: f64, hi: f64, n_l: &Varying, n_v: &Varying, l_v: &Varying) -> Varying {
     let at = |i: usize| 2.0 * n_l.at[i] * n_v.at[i] - l_v.at[i];
-    let deviation = 2.0 * n_l.product_deviation(n_v) + l_v.deviation + PAD;
+    let deviation = phong_deviation(&n_l.quantity(), &n_v.quantity(), &l_v.quantity());
     Varying::new([at(0), at(1), at(2)], lo, hi, deviation)
+}
+
+/// The deviation of `r.v = 2 (n.l)(n.v) - l.v`.
+pub(super) fn phong_deviation(n_l: &Quantity, n_v: &Quantity, l_v: &Quantity) -> f64 {
+    2.0 * n_l.product_deviation(n_v) + l_v.deviation + PAD
 }
 
 /// `n.h`, given its interval by the cones.
 fn blinn_base(lo: f64, hi: f64, n_l: &Varying, n_v: &Varying, l_v: &Varying) -> Varying {
-    let u_lo = 1.0 + l_v.lo;
-    if u_lo < 0.01 {
+    let Some(half) = Halfway::new(&n_l.quantity(), &n_v.quantity(), &l_v.quantity()) else {
         // The corner values may be anything in the interval.
         return Varying {
             at: [lo, hi, hi],
@@ -225,42 +237,59 @@ fn blinn_base(lo: f64, hi: f64, n_l: &Varying, n_v: &Varying, l_v: &Varying) -> 
             hi,
             deviation: hi - lo,
         };
+    };
+    let at = |i: usize| (n_l.at[i] + n_v.at[i]) / (2.0 + 2.0 * l_v.at[i]).sqrt();
+    Varying::new([at(0), at(1), at(2)], lo, hi, half.deviation())
+}
+
+/// The factors of `n.h = (n.l + n.v) psi(1 + l.v)` with `psi(u) = (2 u)^(-1/2)`.
+pub(super) struct Halfway {
+    sum: Quantity,
+    psi: Quantity,
+}
+
+impl Halfway {
+    /// `None` where light and viewer may be nearly opposite.
+    pub(super) fn new(n_l: &Quantity, n_v: &Quantity, l_v: &Quantity) -> Option<Self> {
+        let u_lo = 1.0 + l_v.lo;
+        if u_lo < 0.01 {
+            return None;
+        }
+        // Its slope and curvature are greatest at the least u.
+        let root = 1.0 / (2.0 * u_lo).sqrt();
+        let cube = root * root * root;
+        Some(Self {
+            sum: Quantity {
+                lo: n_l.lo + n_v.lo,
+                hi: n_l.hi + n_v.hi,
+                deviation: n_l.deviation + n_v.deviation,
+                range: n_l.range + n_v.range,
+                magnitude: n_l.magnitude + n_v.magnitude,
+            },
+            psi: Quantity {
+                lo: 0.5,
+                hi: root,
+                deviation: cube * l_v.deviation
+                    + 3.0 / 8.0 * cube * root * root * l_v.range * l_v.range,
+                range: cube * l_v.range,
+                magnitude: root,
+            },
+        })
     }
-    // psi(u) = (2 u)^(-1/2) of u = 1 + l.v, its slope and curvature greatest at the least u.
-    let root = 1.0 / (2.0 * u_lo).sqrt();
-    let cube = root * root * root;
-    let psi = |c: f64| 1.0 / (2.0 + 2.0 * c).sqrt();
-    let psi = Varying {
-        at: [psi(l_v.at[0]), psi(l_v.at[1]), psi(l_v.at[2])],
-        lo: 0.5,
-        hi: root,
-        deviation: cube * l_v.deviation
-            + 3.0 / 8.0 * cube * root * root * l_v.range() * l_v.range(),
-    };
-    let sum = Varying {
-        at: [
-            n_l.at[0] + n_v.at[0],
-            n_l.at[1] + n_v.at[1],
-            n_l.at[2] + n_v.at[2],
-        ],
-        lo: n_l.lo + n_v.lo,
-        hi: n_l.hi + n_v.hi,
-        deviation: n_l.deviation + n_v.deviation,
-    };
-    Varying::new(
-        [
-            sum.at[0] * psi.at[0],
-            sum.at[1] * psi.at[1],
-            sum.at[2] * psi.at[2],
-        ],
-        lo,
-        hi,
-        sum.product_deviation(&psi) + PAD,
-    )
+
+    /// How far it is from interpolation.
+    pub(super) fn deviation(&self) -> f64 {
+        self.sum.product_deviation(&self.psi) + PAD
+    }
+
+    /// How far apart its values at corners are.
+    pub(super) fn range(&self) -> f64 {
+        self.sum.range * self.psi.magnitude + self.psi.range * self.sum.magnitude
+    }
 }
 
 /// A power that is below the flush everywhere is nothing in the picture.
-const FLUSHED: FactorBound = FactorBound {
+pub(super) const FLUSHED: FactorBound = FactorBound {
     lo: 0.0,
     hi: FLUSH,
     deviation: FLUSH,
@@ -268,13 +297,13 @@ const FLUSHED: FactorBound = FactorBound {
 
 /// Whether `c^s <= exp(-s (1 - c))` is below the flush.
 #[inline]
-fn is_flushed(c: f64, exponent: f64) -> bool {
+pub(super) fn is_flushed(c: f64, exponent: f64) -> bool {
     const DEPTH: f64 = 24.0 * std::f64::consts::LN_2;
     exponent * (1.0 - c) > DEPTH
 }
 
-/// The base to the exponent where it is positive and the light is in front.
-fn power(base: &Varying, n_l: &Varying, exponent: f64) -> FactorBound {
+/// The base to the exponent, zero where the base is negative or the light is behind; `is_lit` says that it is in front everywhere.
+pub(super) fn power(base: &Quantity, is_lit: bool, exponent: f64) -> FactorBound {
     let c = base.hi.min(1.0);
     if c <= 0.0 {
         return FactorBound::default();
@@ -282,22 +311,21 @@ fn power(base: &Varying, n_l: &Varying, exponent: f64) -> FactorBound {
     if is_flushed(c, exponent) {
         return FLUSHED;
     }
-    let smooth = exponent >= 2.0 && n_l.lo > 0.0;
+    let smooth = exponent >= 2.0 && is_lit;
     let (hi, mut deviation) = if smooth {
         let curved = power_above(c, exponent - 2.0);
         let slope = exponent * curved * c;
         let curvature = exponent * (exponent - 1.0) * curved;
-        let range = base.range();
         (
             curved * c * c,
-            slope * base.deviation + curvature * range * range * 0.125,
+            slope * base.deviation + curvature * base.range * base.range * 0.125,
         )
     } else {
         (power_above(c, exponent), f64::INFINITY)
     };
     let hi = hi.min(1.0);
     // A lower bound is only worth its cost where there is something to see.
-    let visible = hi > 1.0 / 4096.0 && n_l.lo > 0.0 && base.lo > 0.0;
+    let visible = hi > 1.0 / 4096.0 && is_lit && base.lo > 0.0;
     let lo = if visible && !is_flushed(base.lo, exponent) {
         power_below(base.lo.min(c), exponent)
     } else {

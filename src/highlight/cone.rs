@@ -66,7 +66,7 @@ impl Angle {
 
     /// An angle below 0.01; the error of its cosine is below 1e-9.
     #[inline]
-    fn small(angle: f64) -> Self {
+    pub(super) fn small(angle: f64) -> Self {
         Self {
             cos: 1.0 - 0.5 * angle * angle,
             sin: angle,
@@ -143,20 +143,13 @@ impl Directions {
                 unit[0].dot(unit[2]),
                 unit[1].dot(unit[2]),
             ]);
-        let lost = (2.0 / 3.0 * farthest).max(0.0);
-        // sqrt(1 - e) >= 1 - e/2 - e^2/2 for 0 <= e <= 1.
-        let shrink = 1.0 - 0.5 * lost * (1.0 + lost);
         Self {
             unit,
             length,
             per_length,
             axis,
             spread: Angle::from_cos(cos).plus(Angle::small(pad)),
-            stretch: if lost < 0.9 {
-                1.0 / shrink
-            } else {
-                f64::INFINITY
-            },
+            stretch: stretch(farthest),
             pad,
         }
     }
@@ -198,6 +191,19 @@ impl Directions {
             stretch: f64::INFINITY,
             pad: PAD,
         }
+    }
+}
+
+/// Bound of the sum of weighted lengths over the length of the weighted sum, `farthest` being the greatest `1 - x_i.x_j`.
+#[inline]
+pub(super) fn stretch(farthest: f64) -> f64 {
+    let lost = (2.0 / 3.0 * farthest).max(0.0);
+    // sqrt(1 - e) >= 1 - e/2 - e^2/2 for 0 <= e <= 1.
+    let shrink = 1.0 - 0.5 * lost * (1.0 + lost);
+    if lost < 0.9 {
+        1.0 / shrink
+    } else {
+        f64::INFINITY
     }
 }
 
@@ -246,26 +252,43 @@ impl Varying {
         )
     }
 
+    /// Without the corner values themselves.
+    #[inline]
+    pub(super) fn quantity(&self) -> Quantity {
+        Quantity {
+            lo: self.lo,
+            hi: self.hi,
+            deviation: self.deviation,
+            range: greatest(self.at) - least(self.at),
+            magnitude: magnitude(self.at),
+        }
+    }
+}
+
+/// What is known of a quantity on a triangle, or on each of several.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Quantity {
+    /// Lower bound.
+    pub(super) lo: f64,
+    /// Upper bound.
+    pub(super) hi: f64,
+    /// Bound of the difference from what is interpolated between a triangle's corners.
+    pub(super) deviation: f64,
+    /// How far apart the values at a triangle's corners are at most.
+    pub(super) range: f64,
+    /// The largest absolute value at a corner, or more.
+    pub(super) magnitude: f64,
+}
+
+impl Quantity {
     /// Bound of the deviation of the product with another from the interpolation of its corner values: with both written as
     /// linear part and rest, `sum w_i a_i b_i - lin(a) lin(b) = sum_{i<j} w_i w_j (a_i - a_j) (b_i - b_j)`.
     #[inline]
     pub(super) fn product_deviation(&self, other: &Self) -> f64 {
-        self.deviation * other.magnitude()
-            + other.deviation * self.magnitude()
+        self.deviation * other.magnitude
+            + other.deviation * self.magnitude
             + self.deviation * other.deviation
-            + self.range() * other.range() / 3.0
-    }
-
-    /// The largest absolute corner value.
-    #[inline]
-    fn magnitude(&self) -> f64 {
-        magnitude(self.at)
-    }
-
-    /// How far apart the corner values are.
-    #[inline]
-    pub(super) fn range(&self) -> f64 {
-        greatest(self.at) - least(self.at)
+            + self.range * other.range / 3.0
     }
 }
 

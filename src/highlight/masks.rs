@@ -13,10 +13,27 @@
 //! [`Encoding`]: for a linear one it is half a code of light everywhere, less than for sRGB in bright colours. Terms are skipped in the
 //! order of the share of the budget that they take, until it is spent.
 //!
+//! **Claims.** While a triangle is on its way to that, its pixels show less: colours interpolated over parts of it, or quadratics. How far those
+//! may be off at most is a by-product. Write a factor as the linear interpolation of its values at the triangle's corners and a rest `d`,
+//! `|d| <= D`. Linear functions are reproduced by all of these, so only the rest counts:
+//!
+//! | shown | error of the rest | error within `[lo, hi]` |
+//! |---|---|---|
+//! | linear over the triangle | `D` | `hi - lo` |
+//! | linear over any part, right at its corners | `2 D` | `hi - lo` |
+//! | the quadratic through corners and middles of edges | `(1 + 4/3) D` | `4/3 (hi - lo)` |
+//! | the same over parts, and on an edge interpolated by another quadratic | `(1 + 5/3 * 5/4) D` | `(1 + 1/8 + 5/3 * 1/4) (hi - lo)` |
+//!
+//! (The Lebesgue constants of quadratic interpolation are 5/4 on an edge and 5/3 on a triangle: the greatest sum of the absolute values of its basis, of
+//! which those of the corners are not less than -1/8 each.) The last line is [`ANY_FORM`] and holds for all of them, the third
+//! [`QUADRATIC`]. Where light may be off by `e` either way and is at least `lo`, it is off by at most `encode(max(lo, e)) - encode(max(lo, e) - e)`
+//! in code.
+//!
 //! A term that is absent has `hi = 0` and costs nothing. What [`shade_lanes`](crate::illumination::shade_lanes) itself errs is not part of it.
 
-use super::bound::{LightBound, TriangleBound};
-use super::power::power_below;
+use super::bound::{FactorBound, LightBound, TriangleBound};
+use super::cluster::{ClusterBound, ClusterShape};
+use super::power::{power_above, power_below};
 use crate::illumination::{ActiveLights, LightMask, MAX_LIGHTS};
 use crate::output::Encoding;
 use crate::scene::{Eye, ShadingLight, ShadingMaterial, World};
@@ -41,7 +58,35 @@ pub struct TriangleLights {
     pub rough: ActiveLights,
     /// The same in one word.
     pub verdict: Verdict,
+    /// How far the picture may be off while not all of it is evaluated.
+    pub claim: Claim,
 }
+
+/// How far pixels of a triangle may be from per-pixel Phong shading at most, in 8-bit codes, rounding to codes included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Claim {
+    /// However its colours are interpolated: linearly or by quadratics, over the whole of it or over parts.
+    pub interpolated: u8,
+    /// With the [rough](TriangleLights::rough) terms evaluated and all others interpolated by a quadratic over the whole; not more.
+    pub rough_evaluated: u8,
+}
+
+impl Claim {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self {
+        interpolated: u8::MAX,
+        rough_evaluated: u8::MAX,
+    };
+}
+
+/// By what the deviation of a factor from linear interpolation, and its interval, are multiplied to bound the error of a way to show it.
+type Form = [f64; 2];
+
+/// However it is interpolated. See the [module](self).
+const ANY_FORM: Form = [37.0 / 12.0, 37.0 / 24.0];
+
+/// By a quadratic over the whole triangle.
+const QUADRATIC: Form = [7.0 / 3.0, 4.0 / 3.0];
 
 impl TriangleLights {
     /// Takes the vertices' signs into account: the lights for which the triangle is potentially highlighted.
@@ -72,6 +117,27 @@ pub fn light_masks(world: &World, eye: &Eye, encoding: Encoding, triangle: u32) 
     )
 }
 
+/// The terms that must be evaluated at some pixel of some triangle of a cluster, so that all that is said holds for each of its triangles.
+///
+/// # Panics
+/// When there is no such cluster.
+#[must_use]
+pub fn cluster_masks(
+    world: &World,
+    eye: &Eye,
+    encoding: Encoding,
+    triangle: u32,
+    shape: &ClusterShape,
+) -> TriangleLights {
+    // A cluster belongs to one side of one object.
+    let material = usize::from(world.triangle_material[triangle as usize]);
+    let material = &world.materials[material];
+    let cluster = ClusterBound::new(shape, eye, material);
+    with_room(encoding, material, &world.lights, |light| {
+        cluster.light(light)
+    })
+}
+
 /// The terms that must be evaluated at every pixel of a triangle with these corners and normals.
 ///
 /// Lights beyond [`MAX_LIGHTS`] are ignored.
@@ -84,28 +150,35 @@ pub fn masks_of(
     material: &ShadingMaterial,
     lights: &[ShadingLight],
 ) -> TriangleLights {
-    // Room for few lights is faster made than for many.
-    match lights.len() {
-        0..=8 => masks_with_room::<8>(positions, normals, eye, encoding, material, lights),
-        9..=32 => masks_with_room::<32>(positions, normals, eye, encoding, material, lights),
-        _ => masks_with_room::<MAX_LIGHTS>(positions, normals, eye, encoding, material, lights),
-    }
+    let triangle = TriangleBound::new(positions, normals, eye, material);
+    with_room(encoding, material, lights, |light| triangle.light(light))
 }
 
-fn masks_with_room<const ROOM: usize>(
-    positions: [[f32; 3]; 3],
-    normals: [[f32; 3]; 3],
-    eye: &Eye,
+fn with_room(
     encoding: Encoding,
     material: &ShadingMaterial,
     lights: &[ShadingLight],
+    bound: impl Fn(&ShadingLight) -> LightBound,
+) -> TriangleLights {
+    // Room for few lights is faster made than for many.
+    match lights.len() {
+        0..=8 => masks::<8>(encoding, material, lights, bound),
+        9..=32 => masks::<32>(encoding, material, lights, bound),
+        _ => masks::<MAX_LIGHTS>(encoding, material, lights, bound),
+    }
+}
+
+fn masks<const ROOM: usize>(
+    encoding: Encoding,
+    material: &ShadingMaterial,
+    lights: &[ShadingLight],
+    bound_light: impl Fn(&ShadingLight) -> LightBound,
 ) -> TriangleLights {
     let lights = &lights[..lights.len().min(ROOM)];
-    let triangle = TriangleBound::new(positions, normals, eye, material);
     let mut bounds = [LightBound::default(); ROOM];
     let mut lo = material.ambient.map(f64::from);
     for (bound, light) in bounds.iter_mut().zip(lights) {
-        *bound = triangle.light(light);
+        *bound = bound_light(light);
         for (channel, lo) in lo.iter_mut().enumerate() {
             let [diffuse, specular] = amplitudes(material, light, channel);
             *lo += diffuse * bound.diffuse.lo + specular * bound.specular.lo;
@@ -127,6 +200,10 @@ fn masks_with_room<const ROOM: usize>(
         *pair = [specular, diffuse];
     }
     let [active, rough] = spend(terms[..lights.len()].as_flattened_mut());
+    let claimed = |form: Form, evaluated: ActiveLights| {
+        let bounded = bounds.iter().zip(lights);
+        claim(encoding, lo, material, bounded, form, evaluated)
+    };
     TriangleLights {
         active,
         rough,
@@ -135,6 +212,72 @@ fn masks_with_room<const ROOM: usize>(
         } else {
             Verdict::Lobe
         },
+        claim: Claim {
+            interpolated: claimed(ANY_FORM, ActiveLights::default()),
+            rough_evaluated: claimed(QUADRATIC, rough),
+        },
+    }
+}
+
+/// How far a pixel of at least `lo` may be off, in codes, if all terms are shown in a form but those `evaluated`.
+fn claim<'a>(
+    encoding: Encoding,
+    lo: [f64; 3],
+    material: &ShadingMaterial,
+    bounded: impl Iterator<Item = (&'a LightBound, &'a ShadingLight)>,
+    form: Form,
+    evaluated: ActiveLights,
+) -> u8 {
+    let error = |bound: &FactorBound, is_evaluated: bool| {
+        if is_evaluated {
+            0.0
+        } else {
+            (form[0] * bound.deviation).min(form[1] * (bound.hi - bound.lo))
+        }
+    };
+    let mut light_off = [0.0; 3];
+    for (index, (bound, light)) in bounded.enumerate() {
+        let diffuse = error(&bound.diffuse, evaluated.diffuse.contains(index));
+        let specular = error(&bound.specular, evaluated.specular.contains(index));
+        for (channel, sum) in light_off.iter_mut().enumerate() {
+            let [k_d, k_s] = amplitudes(material, light, channel);
+            *sum += k_d * diffuse + k_s * specular;
+        }
+    }
+    let codes = light_off.iter().zip(lo).map(|(&off, lo)| {
+        // Two codes that differ by less than a whole number before rounding differ by at most that after it.
+        (codes_off(encoding, lo, off) + ROUNDING).ceil()
+    });
+    codes.fold(1, |most, codes| {
+        if codes <= 254.0 {
+            most.max(codes as u8)
+        } else {
+            u8::MAX
+        }
+    })
+}
+
+/// What the arithmetic of pictures, in `f32`, may add, in codes.
+const ROUNDING: f64 = 0.1;
+
+/// Not less than the difference in code of two colours, one of them at least `lo`, that differ by at most `off` in light; infinite
+/// where nothing is known.
+fn codes_off(encoding: Encoding, lo: f64, off: f64) -> f64 {
+    if off.is_nan() || lo.is_nan() {
+        return f64::INFINITY;
+    }
+    // Beyond white everything is white.
+    let off = off - (lo - 1.0).max(0.0);
+    if off <= 0.0 {
+        return 0.0;
+    }
+    let lo = lo.min(1.0);
+    let least = lo - off;
+    if least >= 0.5 * lo {
+        slope(encoding, least) * off
+    } else {
+        // The second is about the first.
+        encode_above(encoding, lo.max(off))
     }
 }
 
@@ -213,17 +356,38 @@ impl Spending {
 
 /// How much linear light may be added to a channel that is at least `lo`: half a code at the slope there.
 fn budget(encoding: Encoding, lo: f64) -> f64 {
-    const HALF_CODE: f64 = 0.5 / 255.0;
     if lo >= 1.0 {
         // White is clamped.
         return f64::INFINITY;
     }
-    match encoding {
-        Encoding::Linear => HALF_CODE,
-        Encoding::Srgb if lo <= 0.003_130_8 => HALF_CODE / 12.92,
-        // encode' = 1.055 / 2.4 x^(-7/12)
-        Encoding::Srgb => HALF_CODE * 2.4 / 1.055 * power_below(lo, 7.0 / 12.0),
+    0.5 / slope(encoding, lo)
+}
+
+/// Linear light up to which the sRGB curve is a straight line, and its slope.
+const TOE: (f64, f64) = (0.003_130_8, 12.92);
+
+/// Codes per linear light at `x`, or more, for `x` up to 1.
+fn slope(encoding: Encoding, x: f64) -> f64 {
+    255.0
+        * match encoding {
+            Encoding::Linear => 1.0,
+            Encoding::Srgb if x <= TOE.0 => TOE.1,
+            // encode' = 1.055 / 2.4 x^(-7/12)
+            Encoding::Srgb => 1.055 / 2.4 / power_below(x, 7.0 / 12.0),
+        }
+}
+
+/// The code of linear light `x >= 0`, or more.
+fn encode_above(encoding: Encoding, x: f64) -> f64 {
+    if x >= 1.0 {
+        return 255.0;
     }
+    255.0
+        * match encoding {
+            Encoding::Linear => x,
+            Encoding::Srgb if x <= TOE.0 => TOE.1 * x,
+            Encoding::Srgb => 1.055 * power_above(x, 1.0 / 2.4) - 0.055,
+        }
 }
 
 #[cfg(test)]
@@ -242,6 +406,30 @@ mod tests {
                 );
             }
             assert_eq!(budget(encoding, 1.0), f64::INFINITY);
+        }
+    }
+
+    #[test]
+    fn codes_are_off_by_no_more_than_is_said() {
+        for encoding in Encoding::ALL {
+            for i in 0..=60 {
+                let lo = 1.2 * (f64::from(i) / 60.0).powi(3);
+                for j in 0..=60 {
+                    let off = 1.5 * (f64::from(j) / 60.0).powi(4);
+                    let said = codes_off(encoding, lo, off);
+                    let mut most = 0.0_f64;
+                    for k in 0..=200 {
+                        let colour = lo + f64::from(k) / 100.0;
+                        let codes = encoding.encode(colour);
+                        most = most.max(codes - encoding.encode(colour - off));
+                        most = most.max(encoding.encode(colour + off) - codes);
+                    }
+                    assert!(most <= said + 1e-9, "{encoding} {lo} {off}: {most} {said}");
+                    let loose = 2.0 * most + encoding.encode(lo) + 1e-9;
+                    assert!(said <= loose, "{encoding} {lo} {off}: {most} {said}");
+                }
+            }
+            assert_eq!(codes_off(encoding, 0.5, f64::NAN), f64::INFINITY);
         }
     }
 }

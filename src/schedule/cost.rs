@@ -35,6 +35,10 @@ pub const PHONG_PIXEL_LIGHT_NS: f32 = 0.84;
 pub const BOUNDS_NS: f32 = 190.0;
 /// See [`BOUNDS_NS`].
 pub const BOUNDS_LIGHT_NS: f32 = 153.0;
+/// Bounding the lights on a run of triangles of a cluster: a fixed part, and a part for each light.
+pub const RUN_BOUNDS_NS: f32 = 1000.0;
+/// See [`RUN_BOUNDS_NS`].
+pub const RUN_BOUNDS_LIGHT_NS: f32 = 100.0;
 /// Making a visible triangle a candidate: a part for each triangle, and one for each light. They cost no work units.
 pub const COLLECT_NS: f32 = 36.0;
 /// See [`COLLECT_NS`].
@@ -141,6 +145,12 @@ pub fn drawing(triangles: f32, pixels: f32) -> f32 {
 #[must_use]
 pub fn bounds(lights: usize) -> f32 {
     BOUNDS_NS + BOUNDS_LIGHT_NS * lights as f32
+}
+
+/// Bounding `lights` lights on a run of triangles.
+#[must_use]
+pub fn run_bounds(lights: usize) -> f32 {
+    RUN_BOUNDS_NS + RUN_BOUNDS_LIGHT_NS * lights as f32
 }
 
 /// Making `triangles` visible triangles candidates under `lights` lights, without samples at their centroids.

@@ -22,11 +22,11 @@ impl Random {
         z ^ z >> 31
     }
 
-    fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f64) as usize
     }
 
@@ -35,7 +35,7 @@ impl Random {
     }
 
     /// Logarithmically even.
-    fn between(&mut self, lo: f64, hi: f64) -> f64 {
+    pub(crate) fn between(&mut self, lo: f64, hi: f64) -> f64 {
         lo * (hi / lo).powf(self.unit())
     }
 
@@ -52,7 +52,7 @@ impl Random {
         std::array::from_fn(|_| self.unit() as f32)
     }
 
-    fn weights(&mut self) -> [f64; 3] {
+    pub(crate) fn weights(&mut self) -> [f64; 3] {
         let w: [f64; 3] = std::array::from_fn(|_| -self.unit().max(1e-9).ln());
         let sum: f64 = w.iter().sum();
         w.map(|w| w / sum)

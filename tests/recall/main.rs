@@ -1,7 +1,8 @@
-//! The bounds miss nothing: a million random triangles, and every triangle of the scenes that come along, under a search for the
-//! worst point of each.
+//! The bounds miss nothing: a million random triangles, and every triangle and cluster of the scenes that come along, under a search
+//! for the worst point of each.
 
 mod cases;
+mod clusters;
 mod precision;
 mod search;
 
@@ -122,7 +123,7 @@ fn codes_off(
 }
 
 /// Bounds and masks of a case with one light against the worst points found.
-fn check_case(case: &Case) -> Result<Tally, String> {
+fn check_case(case: &Case, random: &mut Random) -> Result<Tally, String> {
     let light = &case.lights[0];
     let bound = case.bounds().light(light);
     let worst = search::worst(case, light, search::THOROUGH);
@@ -140,6 +141,9 @@ fn check_case(case: &Case) -> Result<Tally, String> {
         let codes = codes_off(case, light, &worst, &lights, encoding);
         if codes.is_nan() || codes > MOST_CODES {
             return Err(format!("{encoding}: {codes} codes off with {lights:?}"));
+        }
+        if random.below(8) == 0 {
+            clusters::check_claim(case, &lights, encoding, random)?;
         }
         tally.worst_codes = tally.worst_codes.max(codes);
         if encoding == Encoding::Srgb && lights.active.specular.is_empty() {
@@ -164,7 +168,7 @@ fn nothing_is_missed_on_random_triangles() {
             for index in 0..per_chunk {
                 let kind = index % Kind::COUNT;
                 let case = random_case(&mut random, Kind::ALL[kind]);
-                let tally = check_case(&case)
+                let tally = check_case(&case, &mut random)
                     .map_err(|what| format!("chunk {chunk}, case {index}: {what}\n{case:?}"))?;
                 tallies[kind] = tallies[kind] + tally;
             }

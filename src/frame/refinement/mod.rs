@@ -16,6 +16,7 @@
 //! Plans depend on nominal costs and estimates only, and patches are painted in list order until the budget ends, so
 //! that a budget in work units gives the same image for any number of threads.
 
+mod certificate;
 mod collecting;
 mod drawn_once;
 mod leaves;
@@ -25,6 +26,7 @@ mod parts;
 mod places;
 mod planning;
 mod ranking;
+mod runs;
 mod shading;
 
 use super::Method;
@@ -36,6 +38,7 @@ use crate::refine::estimate::{SAMPLES_AT_ONCE, Samples};
 use crate::refine::{FIRST_LEAVES, Forest, LeafId, SplitOutcome};
 use crate::scene::{View, World};
 use crate::schedule::{Allowance, Kind, RankedList, RankedQueue};
+use certificate::Certificate;
 use collecting::Collector;
 pub(super) use drawn_once::DrawnLeaves;
 pub(super) use leaves::for_each_leaf;
@@ -43,6 +46,7 @@ pub use leaves::{Leaf, LeafKind};
 use memory::Memory;
 use parts::Part;
 use places::Places;
+use runs::Runs;
 pub(super) use shading::usual_lights;
 use shading::{Polish, RootShading, Shade};
 use std::collections::VecDeque;
@@ -154,6 +158,9 @@ enum Owner {
 struct Paint {
     patch: Patch,
     owner: Owner,
+    /// How far its pixels may be off before and after, in codes; see [`certificate`].
+    claims: [u8; 2],
+    /// Nominal cost.
     units: u32,
     /// What it takes away from the sum of squared errors, by what is known; see [`error_mass`](Refinement::error_mass).
     benefit: f64,
@@ -188,6 +195,8 @@ pub(super) struct Refinement {
     /// Whether what is remembered takes the place of guesses.
     remembers: bool,
     shadings: Vec<RootShading>,
+    runs: Runs,
+    certificate: Certificate,
     collectors: Vec<Collector>,
     paints: VecDeque<Paint>,
     /// Nominal cost of all plans so far, and of painting what they ask for.
@@ -221,7 +230,7 @@ pub(super) struct Refinement {
     samples: Samples,
     // Workspaces of a piece.
     piece: Vec<Patch>,
-    owners: Vec<Owner>,
+    owners: Vec<(Owner, [u8; 2])>,
     planted: Vec<LeafId>,
     splits: Vec<SplitOutcome>,
     deferred: Vec<Candidate>,
@@ -324,6 +333,8 @@ impl Refinement {
         self.by_area = method == Method::PhongArea;
         let visible = backend.visible_triangles();
         self.visible = visible.len();
+        self.certificate.begin(base.covered_pixels());
+        self.runs.begin(world);
         self.roots.reserve(visible.len());
         self.make_collectors(exec, world);
         self.ranked_roots.reserve(visible.len());
@@ -368,6 +379,12 @@ impl Refinement {
         }
         let mass = self.error_mass + self.benefit_to_paint;
         OPTIMISM * (mass.max(0.0) / self.pixels.max(1) as f64).sqrt()
+    }
+
+    /// How far any pixel may be from per-pixel Phong shading, in codes, and how many may be by more than a code. `None` where
+    /// nothing is shaded per pixel.
+    pub(super) fn certified(&self) -> Option<(u8, u64)> {
+        (!self.is_drawn_once).then(|| (self.certificate.most(), self.certificate.unproved_pixels()))
     }
 
     /// Whether the budget asks for no better image.

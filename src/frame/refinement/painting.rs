@@ -31,7 +31,7 @@ impl Refinement {
             }
             units = with_next;
             self.piece.push(paint.patch);
-            self.owners.push(paint.owner);
+            self.owners.push((paint.owner, paint.claims));
             self.benefit_to_paint -= paint.benefit;
             self.paints.pop_front();
         }
@@ -47,11 +47,13 @@ impl Refinement {
         allowance.spend(units);
         for index in 0..self.piece.len() {
             let patch = self.piece[index];
-            let is_polish = matches!(self.owners[index], Owner::Polish);
+            let (owner, claims) = self.owners[index];
+            self.certificate.lower(claims, patch.pixels);
+            let is_polish = matches!(owner, Owner::Polish);
             if matches!(patch.fill, Fill::Phong { .. }) && !is_polish {
                 self.counters.phong_pixels += u64::from(patch.pixels);
             }
-            if let Owner::Leaf(leaf) = self.owners[index] {
+            if let Owner::Leaf(leaf) = owner {
                 self.note_painted(stage, leaf, patch.pixels);
             }
         }
@@ -84,34 +86,38 @@ impl Refinement {
         &mut self.progressing[index]
     }
 
-    /// Puts a patch of about `pixels` pixels on the list, cut into quarters until each is small enough.
-    pub(super) fn enqueue(&mut self, owner: Owner, patch: Patch, pixels: f32, benefit: f64) {
-        let units = match patch.fill {
+    /// Puts a patch of about `pixels` pixels on the list, cut into quarters until each is small enough. Its cost is found here.
+    pub(super) fn enqueue(&mut self, paint: Paint, pixels: f32) {
+        let units = match paint.patch.fill {
             Fill::Gouraud(_) => cost::repaint(1.0, pixels),
             Fill::Phong { lights, .. } => cost::phong(pixels, lights.diffuse.len()),
         };
         if units > PATCH_UNITS
-            && let Some(quarters) = quarter(&patch)
+            && let Some(quarters) = quarter(&paint.patch)
         {
-            for part in quarters {
-                self.enqueue(owner, part, pixels * 0.25, benefit * 0.25);
+            let benefit = paint.benefit * 0.25;
+            for patch in quarters {
+                let part = Paint {
+                    patch,
+                    benefit,
+                    ..paint
+                };
+                self.enqueue(part, pixels * 0.25);
             }
             return;
         }
         self.enqueued += 1;
         let number = self.enqueued;
-        if let Owner::Leaf(leaf) = owner {
+        if let Owner::Leaf(leaf) = paint.owner {
             let progress = self.leaf_progress(leaf);
             progress.patches += 1;
             progress.shade.last_paint = number;
         }
+        self.benefit_to_paint += paint.benefit;
         self.paints.push_back(Paint {
-            patch,
-            owner,
             units: units as u32,
-            benefit,
+            ..paint
         });
-        self.benefit_to_paint += benefit;
     }
 }
 

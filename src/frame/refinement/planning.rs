@@ -2,8 +2,8 @@
 
 use super::parts;
 use super::ranking::{self, Action};
-use super::shading::{bounds_pay, usual_lights};
-use super::{Candidate, Owner, Progress, Refinement, Stage};
+use super::shading::usual_lights;
+use super::{Candidate, Owner, Paint, Progress, Refinement, Stage};
 use crate::backend::{Fill, Patch};
 use crate::refine::{LeafId, LeafState, PlanOutcome, SplitOutcome};
 use crate::schedule::{Allowance, cost};
@@ -151,9 +151,7 @@ impl Refinement {
         };
         let root = root.map(|index| self.roots[index as usize]);
         match root {
-            Some(root) if self.root_shading(&root).is_none() && bounds_pay(&root, stage) => {
-                cost::bounds(stage.world.lights.len()) as u64
-            }
+            Some(root) if self.root_shading(&root).is_none() => self.look_cost(stage, &root) as u64,
             _ => 0,
         }
     }
@@ -291,7 +289,14 @@ impl Refinement {
             };
             let pixels = leaf.pixels as f32;
             let benefit = benefit_per_pixel * f64::from(pixels);
-            self.enqueue(Owner::Leaf(child), patch, pixels, benefit);
+            let paint = Paint {
+                patch,
+                owner: Owner::Leaf(child),
+                claims: [0; 2],
+                units: 0,
+                benefit,
+            };
+            self.enqueue(paint, pixels);
         }
     }
 

@@ -11,12 +11,13 @@
 //!
 //! Where the bounds would cost more than they can save, all terms are evaluated at once.
 
+use super::certificate::{self, RIGHT};
 use super::parts::SAMPLE_WEIGHTS;
-use super::{Candidate, Owner, Progress, Refinement, Root, Stage, ranking};
+use super::{Candidate, Owner, Paint, Progress, Refinement, Root, Stage, ranking, runs};
 use crate::backend::{Fill, Patch};
 use crate::geometry::bary::{blend, middles};
 use crate::geometry::{Bary, Quadratic};
-use crate::highlight;
+use crate::highlight::{self, Claim, TriangleLights, Verdict};
 use crate::illumination::{ActiveLights, ShadingKit, shade_few};
 use crate::refine::LeafId;
 use crate::refine::estimate::squared_codes;
@@ -87,6 +88,7 @@ impl PixelShading {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RootShading {
     pub(super) shading: Shading,
+    pub(super) claim: Claim,
     /// How the root is shaded as a whole, if it is.
     pub(super) shade: Shade,
 }
@@ -175,7 +177,8 @@ impl Refinement {
             .first
             .filter(|_| mass > ERROR_FOR_STEPS * f64::from(pixels))
         else {
-            self.enqueue_shading(index, Owner::Nobody, corners, &shading, pixels, mass);
+            let claim = self.claim(index).interpolated;
+            self.enqueue_shading(index, Owner::Nobody, claim, corners, &shading, pixels, mass);
             return Shade {
                 last_paint: self.enqueued,
                 polish: 0,
@@ -192,8 +195,15 @@ impl Refinement {
             lights: first.rough,
             remainder: first.rest,
         };
-        let patch = self.patch(index, corners, fill);
-        self.enqueue(Owner::Nobody, patch, pixels, mass - polish.mass());
+        let claim = self.claim(index);
+        let paint = Paint {
+            patch: self.patch(index, corners, fill),
+            owner: Owner::Nobody,
+            claims: [claim.interpolated, claim.rough_evaluated],
+            units: 0,
+            benefit: mass - polish.mass(),
+        };
+        self.enqueue(paint, pixels);
         self.polishes.push(polish);
         self.error_mass += polish.mass();
         let number = self.polishes.len() as u32;
@@ -211,7 +221,16 @@ impl Refinement {
         self.error_mass -= mass;
         if let Shading::PerPixel(shading) = self.shading(stage, polish.root) {
             let (corners, pixels) = (polish.corners, polish.pixels);
-            self.enqueue_shading(polish.root, Owner::Polish, corners, &shading, pixels, mass);
+            let claim = self.claim(polish.root).rough_evaluated;
+            self.enqueue_shading(
+                polish.root,
+                Owner::Polish,
+                claim,
+                corners,
+                &shading,
+                pixels,
+                mass,
+            );
         }
         self.polishes[number as usize].last_paint = self.enqueued;
     }
@@ -242,10 +261,15 @@ impl Refinement {
         }
     }
 
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "what is shaded, how, and what it is worth"
+    )]
     fn enqueue_shading(
         &mut self,
         index: u32,
         owner: Owner,
+        claim: u8,
         corners: [Bary; 3],
         shading: &PixelShading,
         pixels: f32,
@@ -255,8 +279,14 @@ impl Refinement {
             lights: shading.exact,
             remainder: Quadratic::linear(shading.linear),
         };
-        let patch = self.patch(index, corners, fill);
-        self.enqueue(owner, patch, pixels, mass);
+        let paint = Paint {
+            patch: self.patch(index, corners, fill),
+            owner,
+            claims: [claim, RIGHT],
+            units: 0,
+            benefit: mass,
+        };
+        self.enqueue(paint, pixels);
     }
 
     fn patch(&self, index: u32, corners: [Bary; 3], fill: Fill) -> Patch {
@@ -274,29 +304,78 @@ impl Refinement {
         if let Some(known) = self.root_shading(&root) {
             return known.shading;
         }
-        let count = stage.world.lights.len();
-        let shading = if self.by_area || !bounds_pay(&root, stage) {
-            Shading::PerPixel(PixelShading::all(count))
-        } else {
-            self.units_for_bounds += cost::bounds(count) as u64;
-            let view = stage.view;
-            let bounds =
-                highlight::light_masks(stage.world, &view.eye, view.encoding, root.triangle);
-            let evaluated = bounds.active.diffuse.len() + bounds.active.specular.len();
-            self.counters.light_terms += (2 * count - evaluated) as u64;
-            if bounds.verdict == highlight::Verdict::Absent {
-                self.counters.proved += 1;
-                Shading::Proved
-            } else {
-                Shading::PerPixel(pixel_shading(stage, &root, &bounds))
-            }
-        };
+        let (shading, claim) = self.look(stage, &root);
+        let claims = [u8::MAX, claim.interpolated];
+        self.certificate.lower(claims, root.pixels);
         self.roots[index as usize].shading = self.shadings.len() as u32;
         self.shadings.push(RootShading {
             shading,
+            claim,
             shade: Shade::default(),
         });
         shading
+    }
+
+    /// What is claimed of a root that has been looked at.
+    fn claim(&self, index: u32) -> Claim {
+        let known = self.root_shading(&self.roots[index as usize]);
+        known.map_or(Claim::UNKNOWN, |known| known.claim)
+    }
+
+    /// Nominal cost of finding out which terms a root needs.
+    pub(super) fn look_cost(&self, stage: &Stage<'_>, root: &Root) -> f32 {
+        let lights = stage.world.lights.len();
+        if bounds_pay(root, stage) {
+            cost::bounds(lights)
+        } else if runs::pay(root, stage) && self.runs.is_unknown(stage.world, root.triangle) {
+            cost::run_bounds(lights)
+        } else {
+            0.0
+        }
+    }
+
+    /// Finds out which terms a root needs: by bounds of its own, by those of its run, or without any.
+    fn look(&mut self, stage: &Stage<'_>, root: &Root) -> (Shading, Claim) {
+        let count = stage.world.lights.len();
+        let everything = Shading::PerPixel(PixelShading::all(count));
+        if self.by_area {
+            return (everything, Claim::UNKNOWN);
+        }
+        self.units_for_bounds += self.look_cost(stage, root) as u64;
+        let is_large = bounds_pay(root, stage);
+        let lights = if is_large {
+            let view = stage.view;
+            highlight::light_masks(stage.world, &view.eye, view.encoding, root.triangle)
+        } else if runs::pay(root, stage) {
+            *self.runs.lights(stage, root.triangle)
+        } else {
+            return (everything, Claim::UNKNOWN);
+        };
+        let is_proved = self.is_right_as_it_is(stage, root, &lights);
+        let claim = certificate::claim_if_proved(lights.claim, is_proved);
+        if is_proved {
+            self.counters.proved += 1;
+        }
+        if is_proved || is_large {
+            let evaluated = lights.active.diffuse.len() + lights.active.specular.len();
+            self.counters.light_terms += (2 * count - evaluated) as u64;
+        }
+        let shading = match (is_proved, is_large) {
+            (true, _) => Shading::Proved,
+            (false, true) => Shading::PerPixel(pixel_shading(stage, root, &lights)),
+            // All are evaluated: to find out what instead of the others takes longer than a few pixels do.
+            (false, false) => everything,
+        };
+        (shading, claim)
+    }
+
+    /// Whether the picture shows the triangle within a code of what it should be, whatever is interpolated. The proof is about linear
+    /// interpolation over all of it; the claim covers what else it may show, being subdivided or curved, or having been so in an image that
+    /// parts were kept of.
+    fn is_right_as_it_is(&self, stage: &Stage<'_>, root: &Root, lights: &TriangleLights) -> bool {
+        let is_whole = stage.base.is_whole() && !self.forest.is_planted(root.triangle);
+        lights.verdict == Verdict::Absent
+            && (is_whole && !root.is_curved || lights.claim.interpolated <= RIGHT)
     }
 }
 
@@ -310,11 +389,7 @@ pub(super) enum ShadeKind {
 }
 
 /// Both steps for a root, by its bounds.
-fn pixel_shading(
-    stage: &Stage<'_>,
-    root: &Root,
-    bounds: &highlight::TriangleLights,
-) -> PixelShading {
+fn pixel_shading(stage: &Stage<'_>, root: &Root, bounds: &TriangleLights) -> PixelShading {
     let world = stage.world;
     let vertices = world.triangles[root.triangle as usize].map(|v| v as usize);
     let material = usize::from(world.triangle_material[root.triangle as usize]);
