@@ -6,8 +6,9 @@
 
 use specula::backend::software::SoftwareBackend;
 use specula::backend::{Backend, BasePaint, Fill, Geometry, Patch};
+use specula::geometry::clusters::RUN;
 use specula::geometry::{Bary, Quadratic, Vec3s};
-use specula::highlight::{SignBits, compute_signs, light_masks};
+use specula::highlight::{ClusterShape, SignBits, cluster_masks, compute_signs, light_masks};
 use specula::illumination::{ActiveLights, PointBatch, shade_vertices};
 use specula::parallel::Exec;
 use specula::refine::Forest;
@@ -51,6 +52,7 @@ fn main() {
     report("sign_test_vertex", "light", per_light(&Bench::signs));
     report("collect_triangle", "light", per_light(&Bench::collect));
     report("bounds_triangle", "light", per_light(&Bench::bounds));
+    report("bounds_run", "light", per_light(&Bench::run_bounds));
     report("plan_leaf", "light", per_light(&Bench::plan_leaf));
 
     let bench = Bench::new(4, exec, rounds);
@@ -262,6 +264,37 @@ impl Bench {
             }
         });
         ns / triangles.len() as f64
+    }
+
+    /// Bounding runs of triangles, per run.
+    fn run_bounds(&self) -> f64 {
+        let (world, view) = (&self.world, &self.view);
+        let runs = || {
+            let clusters = world
+                .clusters
+                .iter()
+                .map(|cluster| cluster.triangles.clone());
+            clusters.flat_map(|triangles| {
+                let end = triangles.end;
+                triangles
+                    .step_by(RUN)
+                    .map(move |first| first..end.min(first + RUN as u32))
+            })
+        };
+        let ns = self.median_ns(|| {
+            for run in runs() {
+                let first = run.start;
+                let shape = ClusterShape::new(world, run);
+                std::hint::black_box(cluster_masks(
+                    world,
+                    &view.eye,
+                    view.encoding,
+                    first,
+                    &shape,
+                ));
+            }
+        });
+        ns / runs().count() as f64
     }
 
     /// Planting every visible triangle and splitting it in four, per leaf made, illumination included.

@@ -19,6 +19,10 @@ use super::Vec3s;
 use glam::DVec3;
 use std::ops::Range;
 
+/// Most triangles of a run: what is left when a cluster is split on in the same way, into consecutive triangles that lie closer together still.
+/// From its first triangle on a cluster consists of whole runs and, last of all, the rest.
+pub const RUN: usize = 16;
+
 /// Most triangles of a cluster.
 pub const MAX_TRIANGLES: usize = 128;
 
@@ -124,12 +128,33 @@ fn split(items: &mut [Item], sizes: &mut Vec<usize>) {
     let clusters = items.len().div_ceil(MAX_TRIANGLES);
     if clusters <= 1 {
         if !items.is_empty() {
-            // Inside a cluster the author's order is as good as any, and often a strip.
-            items.sort_unstable_by_key(|item| item.index);
+            sort_into_runs(items);
             sizes.push(items.len());
         }
         return;
     }
+    // In proportion to the clusters on each side, so that none gets more than its share.
+    let middle = items.len() * (clusters / 2) / clusters;
+    let (left, right) = halves(items, middle);
+    split(left, sizes);
+    split(right, sizes);
+}
+
+/// Sorts the items of a cluster into runs.
+fn sort_into_runs(items: &mut [Item]) {
+    let runs = items.len().div_ceil(RUN);
+    if runs <= 1 {
+        // Inside a run the author's order is as good as any, and often a strip.
+        items.sort_unstable_by_key(|item| item.index);
+        return;
+    }
+    let (left, right) = halves(items, runs / 2 * RUN);
+    sort_into_runs(left);
+    sort_into_runs(right);
+}
+
+/// Brings those with the least centroids along the longest axis of the box about all to the front, so many of them.
+fn halves(items: &mut [Item], middle: usize) -> (&mut [Item], &mut [Item]) {
     let extent = |k: usize| {
         let values = items.iter().map(|item| item.centroid[k]);
         let min = values.clone().fold(f64::INFINITY, f64::min);
@@ -140,14 +165,10 @@ fn split(items: &mut [Item], sizes: &mut Vec<usize>) {
         0,
         |best, k| if extents[k] > extents[best] { k } else { best },
     );
-    // In proportion to the clusters on each side, so that none gets more than its share.
-    let middle = items.len() * (clusters / 2) / clusters;
     items.select_nth_unstable_by(middle, |a, b| {
         (a.centroid[axis].total_cmp(&b.centroid[axis])).then(a.index.cmp(&b.index))
     });
-    let (left, right) = items.split_at_mut(middle);
-    split(left, sizes);
-    split(right, sizes);
+    items.split_at_mut(middle)
 }
 
 /// The bounds of one cluster.

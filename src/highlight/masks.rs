@@ -77,6 +77,12 @@ impl Claim {
         interpolated: u8::MAX,
         rough_evaluated: u8::MAX,
     };
+
+    /// Half a code for all that is left out, and rounding.
+    pub const RIGHT: Self = Self {
+        interpolated: 1,
+        rough_evaluated: 1,
+    };
 }
 
 /// By what the deviation of a factor from linear interpolation, and its interval, are multiplied to bound the error of a way to show it.

@@ -18,6 +18,8 @@ pub const VERTEX_LIGHT_NS: f32 = 0.85;
 pub const LEAF_NS: f32 = 455.0;
 /// Putting a triangle, leaf or part on the list of what is to be shaded.
 pub const LIST_NS: f32 = 150.0;
+/// Taking up a triangle only to find out whether it needs anything.
+pub const LOOK_NS: f32 = 30.0;
 /// Taking a sample inside a leaf, without its illumination.
 pub const SAMPLE_NS: f32 = 40.0;
 /// Repainting a patch with interpolated colours: a fixed part, and a part for each pixel.
@@ -36,9 +38,9 @@ pub const BOUNDS_NS: f32 = 190.0;
 /// See [`BOUNDS_NS`].
 pub const BOUNDS_LIGHT_NS: f32 = 153.0;
 /// Bounding the lights on a run of triangles of a cluster: a fixed part, and a part for each light.
-pub const RUN_BOUNDS_NS: f32 = 1000.0;
+pub const RUN_BOUNDS_NS: f32 = 750.0;
 /// See [`RUN_BOUNDS_NS`].
-pub const RUN_BOUNDS_LIGHT_NS: f32 = 100.0;
+pub const RUN_BOUNDS_LIGHT_NS: f32 = 95.0;
 /// Making a visible triangle a candidate: a part for each triangle, and one for each light. They cost no work units.
 pub const COLLECT_NS: f32 = 36.0;
 /// See [`COLLECT_NS`].

@@ -8,7 +8,7 @@
 use crate::highlight::Claim;
 
 /// The bound, in codes, of what is right.
-pub(super) const RIGHT: u8 = 1;
+pub(super) const RIGHT: u8 = Claim::RIGHT.interpolated;
 
 /// Covered pixels by their bound in codes.
 #[derive(Clone, Debug)]
@@ -47,17 +47,5 @@ impl Certificate {
     /// How many pixels have a bound of more than a code.
     pub(super) fn unproved_pixels(&self) -> u64 {
         self.pixels[usize::from(RIGHT) + 1..].iter().sum()
-    }
-}
-
-/// What is claimed of a triangle's pixels before they are shaded.
-pub(super) fn claim_if_proved(claim: Claim, is_proved: bool) -> Claim {
-    if is_proved {
-        Claim {
-            interpolated: RIGHT,
-            rough_evaluated: RIGHT,
-        }
-    } else {
-        claim
     }
 }

@@ -63,6 +63,9 @@ const FIRST_SHADINGS: usize = 1 << 11;
 /// No place in [`Refinement::shadings`].
 const NONE: u32 = u32::MAX;
 
+/// In place of one for roots that are right as they are.
+const PROVED: u32 = u32::MAX - 1;
+
 /// How much more error an image has than the sum of its estimates says, halfway: what looks worst is refined first, so what is
 /// left was underestimated as a rule. Fitted to the example scenes, like the guesses in [`ranking`].
 const OPTIMISM: f64 = 1.13;
@@ -96,7 +99,7 @@ struct Root {
     pixels: u32,
     /// Mean squared error, guessed or remembered, before anything was looked at.
     prior: f32,
-    /// Where in [`Refinement::shadings`] it is said how its pixels are shaded, once that has been asked; or [`NONE`].
+    /// Where in [`Refinement::shadings`] it is said how its pixels are shaded, once that has been asked; or [`NONE`], or [`PROVED`].
     shading: u32,
     is_pht: bool,
     /// Divided before the first image was drawn.
@@ -423,7 +426,10 @@ impl Refinement {
 
     /// How a root is shaded, if that has been asked.
     fn root_shading(&self, root: &Root) -> Option<&RootShading> {
-        self.shadings.get(root.shading as usize)
+        match root.shading {
+            PROVED => Some(&shading::RIGHT_AS_IT_IS),
+            place => self.shadings.get(place as usize),
+        }
     }
 
     /// Notes that a root is being subdivided or shaded per pixel.

@@ -97,12 +97,13 @@ impl Refinement {
     fn planning_cost(&self, stage: &Stage<'_>, candidate: Candidate, action: Action) -> u64 {
         let lights = stage.world.lights.len();
         let units = match (candidate, action) {
+            (Candidate::Root(_), Action::Look) => cost::LOOK_NS,
             (Candidate::Root(_), Action::Shade) | (Candidate::Polish(_), _) => cost::LIST_NS,
             (Candidate::Root(index), Action::Split(_)) => {
                 let pixels = self.roots[index as usize].pixels;
                 self.root_ranking(lights).planting_cost(pixels)
             }
-            (Candidate::Leaf(leaf), Action::Shade) => {
+            (Candidate::Leaf(leaf), Action::Shade | Action::Look) => {
                 ranking::cutting_cost(self.forest.leaf(leaf).pixels as f32, lights)
             }
             (Candidate::Leaf(leaf), Action::Split(marks)) => {
@@ -127,7 +128,8 @@ impl Refinement {
             }
         };
         match action {
-            // It is only looked at.
+            Action::Look => 0.0,
+            // It is only planted.
             Action::Split(_) if is_root => 0.0,
             Action::Shade if !is_root && parts::is_large(pixels) => 0.0,
             Action::Split(marks) => {
@@ -168,6 +170,9 @@ impl Refinement {
 
     fn plan_root(&mut self, stage: &Stage<'_>, index: u32, action: Action) {
         let root = self.roots[index as usize];
+        if action == Action::Look {
+            return self.look_at_root(stage, index);
+        }
         let colours = stage.base.colours();
         // Without room for another leaf it is shaded, too.
         let is_planted = action != Action::Shade
@@ -183,11 +188,13 @@ impl Refinement {
     fn plan_leaf(&mut self, stage: &Stage<'_>, leaf: LeafId, action: Action) {
         let marks = match action {
             // It stays as it is, and follows its neighbours.
-            Action::Shade if self.is_drawn_once => return,
-            Action::Shade if parts::is_large(self.forest.leaf(leaf).pixels as f32) => {
+            Action::Shade | Action::Look if self.is_drawn_once => return,
+            Action::Shade | Action::Look
+                if parts::is_large(self.forest.leaf(leaf).pixels as f32) =>
+            {
                 return self.cut_into_parts(stage, leaf);
             }
-            Action::Shade => return self.shade_leaf(stage, leaf),
+            Action::Shade | Action::Look => return self.shade_leaf(stage, leaf),
             Action::Split(marks) => marks,
         };
         let (roots, places) = (&self.roots, &self.places);
@@ -301,7 +308,7 @@ impl Refinement {
     }
 
     /// Ranks a candidate and puts it on the queue.
-    fn offer(&mut self, stage: &Stage<'_>, candidate: Candidate) {
+    pub(super) fn offer(&mut self, stage: &Stage<'_>, candidate: Candidate) {
         match candidate {
             Candidate::Leaf(leaf) => self.offer_leaf(stage, leaf),
             Candidate::Part(part) => self.offer_part(stage, part),

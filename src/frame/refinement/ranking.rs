@@ -10,8 +10,8 @@
 
 use super::drawn_once;
 use super::parts::{self, CUT, SAMPLES_PER_PART};
-use super::shading::{Shading, usual_lights};
-use super::{Refinement, Root, Stage};
+use super::shading::{Shading, is_lookable, usual_lights};
+use super::{NONE, Refinement, Root, Stage};
 use crate::output::Encoding;
 use crate::refine::{Forest, LeafId};
 use crate::schedule::cost;
@@ -30,6 +30,12 @@ const SPLIT_YIELD: f32 = 0.5;
 /// A triangle that is to be planted comes so much sooner: planting costs little beside what it tells.
 const CURIOSITY: f32 = 4.0;
 
+/// Mean squared error, in squared codes, up to which a triangle is looked at before it is shaded.
+const LOOK_ERROR: f32 = 0.25;
+
+/// It is looked at so much sooner than it would be shaded: that costs a fraction, and may be all there is to do.
+const LOOK_FIRST: f32 = 8.0;
+
 /// Share of what is guessed of a triangle that may be left when it is divided by 1.
 const CURVED_GUESS: f32 = 0.5;
 
@@ -39,6 +45,8 @@ const POINTS_PER_LEAF: f32 = 1.5;
 /// What is to be done to a triangle or leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Action {
+    /// Find out which lights matter, and whether it needs any refinement.
+    Look,
     /// Evaluate the illumination equation at its pixels.
     Shade,
     /// Split its marked edges (bit k: from corner k to corner k + 1).
@@ -141,9 +149,17 @@ impl RootRanking<'_> {
         // What is curved already would not gain by linear parts.
         if split > shade && !root.is_curved {
             (CURIOSITY * split, Action::Split(7))
+        } else if self.is_looked_at(root) {
+            (LOOK_FIRST * shade, Action::Look)
         } else {
             (shade, Action::Shade)
         }
+    }
+
+    /// Whether it is to be found out whether a triangle needs any refinement before it gets some.
+    fn is_looked_at(&self, root: &Root) -> bool {
+        let is_right_by_guess = root.prior <= LOOK_ERROR && !self.is_drawn_once;
+        is_right_by_guess && root.shading == NONE && is_lookable(root.pixels, self.lights)
     }
 
     /// Nominal cost of making a triangle of `pixels` pixels a leaf that can be split.

@@ -4,16 +4,12 @@
 //! a cluster cost hardly more than one's ([`ClusterShape`]), and in a fine mesh they prove most runs right as they are: none of
 //! their triangles is shaded. They are found when the first triangle of a run is asked for, once for an image.
 
-use super::{NONE, Root, Stage};
-use crate::geometry::clusters::MAX_TRIANGLES;
+use super::{NONE, Stage};
+use crate::geometry::clusters::{MAX_TRIANGLES, RUN};
 use crate::highlight::{self, ClusterShape, TriangleLights};
 use crate::scene::World;
 use crate::schedule::cost;
 use std::ops::Range;
-
-/// Most triangles of a run. More have wider cones of normals: of a mesh of 57,000 triangles runs of 128 prove a quarter, of 32 a half,
-/// of 16 six tenths; of single triangles nine tenths are.
-const RUN: usize = 16;
 
 /// Runs of a cluster.
 const RUNS: usize = MAX_TRIANGLES / RUN;
@@ -47,19 +43,23 @@ impl Runs {
         self.places[run as usize] == NONE
     }
 
-    /// The terms that some triangle of this one's run needs.
-    pub(super) fn lights(&mut self, stage: &Stage<'_>, triangle: u32) -> &TriangleLights {
+    /// The terms that some triangle of this one's run needs, and the run's triangles.
+    pub(super) fn lights(
+        &mut self,
+        stage: &Stage<'_>,
+        triangle: u32,
+    ) -> (TriangleLights, Range<u32>) {
         let Stage { world, view, .. } = *stage;
         let (run, triangles) = run_of(world, triangle);
         let place = &mut self.places[run as usize];
         if *place == NONE {
             *place = self.known.len() as u32;
-            let shape = ClusterShape::new(world, triangles);
+            let shape = ClusterShape::new(world, triangles.clone());
             let lights =
                 highlight::cluster_masks(world, &view.eye, view.encoding, triangle, &shape);
             self.known.push((run, lights));
         }
-        &self.known[*place as usize].1
+        (self.known[*place as usize].1, triangles)
     }
 }
 
@@ -76,9 +76,8 @@ fn run_of(world: &World, triangle: u32) -> (u32, Range<u32>) {
     (number, first..end.min(first + RUN as u32))
 }
 
-/// Whether the bounds of a run save more than they cost, if half of its triangles are like this one.
-pub(super) fn pay(root: &Root, stage: &Stage<'_>) -> bool {
-    let lights = stage.world.lights.len();
-    let shading = cost::phong(root.pixels as f32, lights) * RUN as f32;
+/// Whether the bounds of a run save more than they cost, if half of its triangles have so many pixels and are proved.
+pub(super) fn pay(pixels: u32, lights: usize) -> bool {
+    let shading = cost::phong(pixels as f32, lights) * RUN as f32;
     shading * 0.5 >= cost::run_bounds(lights)
 }

@@ -11,9 +11,11 @@
 //!
 //! Where the bounds would cost more than they can save, all terms are evaluated at once.
 
-use super::certificate::{self, RIGHT};
+use super::certificate::RIGHT;
 use super::parts::SAMPLE_WEIGHTS;
-use super::{Candidate, Owner, Paint, Progress, Refinement, Root, Stage, ranking, runs};
+use super::{
+    Candidate, NONE, Owner, PROVED, Paint, Progress, Refinement, Root, Stage, ranking, runs,
+};
 use crate::backend::{Fill, Patch};
 use crate::geometry::bary::{blend, middles};
 use crate::geometry::{Bary, Quadratic};
@@ -22,6 +24,7 @@ use crate::illumination::{ActiveLights, ShadingKit, shade_few};
 use crate::refine::LeafId;
 use crate::refine::estimate::squared_codes;
 use crate::schedule::cost;
+use std::ops::Range;
 
 /// Pixels with a mean squared error below this, in squared codes, are shaded in a single step.
 const ERROR_FOR_STEPS: f64 = 0.25;
@@ -66,7 +69,7 @@ struct FirstStep {
 }
 
 impl PixelShading {
-    /// Everything at once.
+    /// Everything of the first so many lights at once.
     fn all(lights: usize) -> Self {
         Self {
             exact: ActiveLights::all(lights),
@@ -92,6 +95,16 @@ pub(super) struct RootShading {
     /// How the root is shaded as a whole, if it is.
     pub(super) shade: Shade,
 }
+
+/// Of all roots that are right as they are.
+pub(super) const RIGHT_AS_IT_IS: RootShading = RootShading {
+    shading: Shading::Proved,
+    claim: Claim::RIGHT,
+    shade: Shade {
+        last_paint: 0,
+        polish: 0,
+    },
+};
 
 /// What was put on the list to shade something.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -127,9 +140,13 @@ pub(in crate::frame) fn usual_lights(lights: usize) -> usize {
 }
 
 /// Whether finding out which lights a root needs may save more than it costs: perhaps half of them can be left out.
-pub(super) fn bounds_pay(root: &Root, stage: &Stage<'_>) -> bool {
-    let lights = stage.world.lights.len();
-    cost::light_saved(root.pixels as f32) * lights as f32 * 0.5 >= cost::bounds(lights)
+fn bounds_pay(pixels: u32, lights: usize) -> bool {
+    cost::light_saved(pixels as f32) * lights as f32 * 0.5 >= cost::bounds(lights)
+}
+
+/// Whether anything can be found out about a root before it is shaded.
+pub(super) fn is_lookable(pixels: u32, lights: usize) -> bool {
+    bounds_pay(pixels, lights) || runs::pay(pixels, lights)
 }
 
 impl Refinement {
@@ -143,6 +160,14 @@ impl Refinement {
         let place = self.roots[index as usize].shading as usize;
         if let Some(known) = self.shadings.get_mut(place) {
             known.shade = shade;
+        }
+    }
+
+    /// Finds out which terms a root needs. If it needs none it is done, else it will be shaded later.
+    pub(super) fn look_at_root(&mut self, stage: &Stage<'_>, index: u32) {
+        match self.shading(stage, index) {
+            Shading::Proved => self.shade_root(stage, index),
+            Shading::PerPixel(_) => self.offer(stage, Candidate::Root(index)),
         }
     }
 
@@ -178,7 +203,16 @@ impl Refinement {
             .filter(|_| mass > ERROR_FOR_STEPS * f64::from(pixels))
         else {
             let claim = self.claim(index).interpolated;
-            self.enqueue_shading(index, Owner::Nobody, claim, corners, &shading, pixels, mass);
+            self.enqueue_shading(
+                stage,
+                index,
+                Owner::Nobody,
+                claim,
+                corners,
+                &shading,
+                pixels,
+                mass,
+            );
             return Shade {
                 last_paint: self.enqueued,
                 polish: 0,
@@ -223,6 +257,7 @@ impl Refinement {
             let (corners, pixels) = (polish.corners, polish.pixels);
             let claim = self.claim(polish.root).rough_evaluated;
             self.enqueue_shading(
+                stage,
                 polish.root,
                 Owner::Polish,
                 claim,
@@ -267,6 +302,7 @@ impl Refinement {
     )]
     fn enqueue_shading(
         &mut self,
+        stage: &Stage<'_>,
         index: u32,
         owner: Owner,
         claim: u8,
@@ -275,9 +311,17 @@ impl Refinement {
         pixels: f32,
         mass: f64,
     ) {
-        let fill = Fill::Phong {
-            lights: shading.exact,
-            remainder: Quadratic::linear(shading.linear),
+        let fill = if shading.exact.diffuse.is_empty() {
+            // Proved, though shown otherwise: bit by bit what the first image shows of those that are not curved.
+            let triangle = self.roots[index as usize].triangle;
+            let colours = stage.world.triangles[triangle as usize]
+                .map(|vertex| stage.base.colours().get(vertex as usize));
+            Fill::Gouraud(corners.map(|corner| blend(corner.weights(), colours)))
+        } else {
+            Fill::Phong {
+                lights: shading.exact,
+                remainder: Quadratic::linear(shading.linear),
+            }
         };
         let paint = Paint {
             patch: self.patch(index, corners, fill),
@@ -304,7 +348,11 @@ impl Refinement {
         if let Some(known) = self.root_shading(&root) {
             return known.shading;
         }
-        let (shading, claim) = self.look(stage, &root);
+        let (shading, claim) = self.look(stage, index);
+        if matches!(shading, Shading::Proved) {
+            self.note_proved(stage, index);
+            return shading;
+        }
         let claims = [u8::MAX, claim.interpolated];
         self.certificate.lower(claims, root.pixels);
         self.roots[index as usize].shading = self.shadings.len() as u32;
@@ -316,6 +364,37 @@ impl Refinement {
         shading
     }
 
+    /// Notes that a root is right as it is.
+    fn note_proved(&mut self, stage: &Stage<'_>, index: u32) {
+        let root = &mut self.roots[index as usize];
+        root.shading = PROVED;
+        self.certificate.lower([u8::MAX, RIGHT], root.pixels);
+        self.counters.proved += 1;
+        self.counters.light_terms += 2 * stage.world.lights.len() as u64;
+    }
+
+    /// Is done with all triangles of a run that are proved right as they are, apart from the one that was asked for.
+    fn conclude_run(
+        &mut self,
+        stage: &Stage<'_>,
+        run: Range<u32>,
+        lights: &TriangleLights,
+        asked: u32,
+    ) {
+        for triangle in run.filter(|&triangle| triangle != asked) {
+            let Some(index) = self.root_of(triangle) else {
+                continue;
+            };
+            let root = self.roots[index as usize];
+            let is_untouched = root.progress == Progress::Waiting && root.shading == NONE;
+            if is_untouched && self.is_right_as_it_is(stage, &root, lights) {
+                self.note_proved(stage, index);
+                self.roots[index as usize].progress = Progress::Done;
+                self.error_mass -= root.mass();
+            }
+        }
+    }
+
     /// What is claimed of a root that has been looked at.
     fn claim(&self, index: u32) -> Claim {
         let known = self.root_shading(&self.roots[index as usize]);
@@ -325,9 +404,10 @@ impl Refinement {
     /// Nominal cost of finding out which terms a root needs.
     pub(super) fn look_cost(&self, stage: &Stage<'_>, root: &Root) -> f32 {
         let lights = stage.world.lights.len();
-        if bounds_pay(root, stage) {
+        if bounds_pay(root.pixels, lights) {
             cost::bounds(lights)
-        } else if runs::pay(root, stage) && self.runs.is_unknown(stage.world, root.triangle) {
+        } else if runs::pay(root.pixels, lights) && self.runs.is_unknown(stage.world, root.triangle)
+        {
             cost::run_bounds(lights)
         } else {
             0.0
@@ -335,38 +415,40 @@ impl Refinement {
     }
 
     /// Finds out which terms a root needs: by bounds of its own, by those of its run, or without any.
-    fn look(&mut self, stage: &Stage<'_>, root: &Root) -> (Shading, Claim) {
+    fn look(&mut self, stage: &Stage<'_>, index: u32) -> (Shading, Claim) {
+        let root = self.roots[index as usize];
         let count = stage.world.lights.len();
         let everything = Shading::PerPixel(PixelShading::all(count));
         if self.by_area {
             return (everything, Claim::UNKNOWN);
         }
-        self.units_for_bounds += self.look_cost(stage, root) as u64;
-        let is_large = bounds_pay(root, stage);
-        let lights = if is_large {
+        self.units_for_bounds += self.look_cost(stage, &root) as u64;
+        if bounds_pay(root.pixels, count) {
             let view = stage.view;
-            highlight::light_masks(stage.world, &view.eye, view.encoding, root.triangle)
-        } else if runs::pay(root, stage) {
-            *self.runs.lights(stage, root.triangle)
-        } else {
-            return (everything, Claim::UNKNOWN);
-        };
-        let is_proved = self.is_right_as_it_is(stage, root, &lights);
-        let claim = certificate::claim_if_proved(lights.claim, is_proved);
-        if is_proved {
-            self.counters.proved += 1;
-        }
-        if is_proved || is_large {
+            let lights =
+                highlight::light_masks(stage.world, &view.eye, view.encoding, root.triangle);
+            if self.is_right_as_it_is(stage, &root, &lights) {
+                return (Shading::Proved, Claim::RIGHT);
+            }
             let evaluated = lights.active.diffuse.len() + lights.active.specular.len();
             self.counters.light_terms += (2 * count - evaluated) as u64;
+            let shading = pixel_shading(stage, &root, &lights);
+            return (Shading::PerPixel(shading), lights.claim);
         }
-        let shading = match (is_proved, is_large) {
-            (true, _) => Shading::Proved,
-            (false, true) => Shading::PerPixel(pixel_shading(stage, root, &lights)),
-            // All are evaluated: to find out what instead of the others takes longer than a few pixels do.
-            (false, false) => everything,
+        if !runs::pay(root.pixels, count) {
+            return (everything, Claim::UNKNOWN);
+        }
+        let (lights, run) = self.runs.lights(stage, root.triangle);
+        if self.is_right_as_it_is(stage, &root, &lights) {
+            self.conclude_run(stage, run, &lights, root.triangle);
+            return (Shading::Proved, Claim::RIGHT);
+        }
+        // Else all are evaluated: to find out what instead of the others takes longer than a few pixels do.
+        let shading = match lights.verdict {
+            Verdict::Absent => Shading::PerPixel(PixelShading::all(0)),
+            _ => everything,
         };
-        (shading, claim)
+        (shading, lights.claim)
     }
 
     /// Whether the picture shows the triangle within a code of what it should be, whatever is interpolated. The proof is about linear

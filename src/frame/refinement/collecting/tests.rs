@@ -172,7 +172,15 @@ fn expected(exec: Exec, image: &Image, method: Method) -> Vec<Expected> {
                 // The first step of shading evaluates about one light in eight.
                 let shade = benefit / cost::phong(area, lights.min(1 + lights / 8));
                 let split = 0.5 * benefit * (15.0 / 16.0) / split;
-                if split > shade { 4.0 * split } else { shade }
+                // Its bounds, or those of its run.
+                let own = cost::light_saved(area) * lights as f32 * 0.5 >= cost::bounds(lights);
+                let is_lookable =
+                    own || cost::phong(area, lights) * 8.0 >= cost::run_bounds(lights);
+                match () {
+                    () if split > shade => 4.0 * split,
+                    () if prior <= 0.25 && is_lookable => 8.0 * shade,
+                    () => shade,
+                }
             }
         };
         (triangle, pixels, prior, is_pht, Rank::new(rank))
