@@ -1,13 +1,14 @@
 //! `Engine::for_each_leaf` says what the image consists of: held against the image itself.
 
-use specula::frame::{Leaf, LeafKind};
+#[path = "support/leaves.rs"]
+mod support;
+
+use specula::frame::LeafKind;
 use specula::geometry::Bary;
-use specula::geometry::screen::{TrianglePlanes, normalized_weights};
-use specula::measure::ReferenceImage;
 use specula::output::encode::encode;
-use specula::scene::World;
 use specula::{Budget, Engine, EngineOptions, Frame, Method, Scene};
 use std::collections::HashMap;
+use support::{inside, leaves, pixels};
 
 const SIZE: (u32, u32) = (480, 320);
 
@@ -46,51 +47,10 @@ fn engine(scene: &Scene, method: Method) -> Engine {
     Engine::with_options(scene, options).expect("the options are valid")
 }
 
-/// The leaves of each triangle.
-fn leaves(engine: &Engine) -> HashMap<u32, Vec<Leaf>> {
-    let mut all: HashMap<u32, Vec<Leaf>> = HashMap::new();
-    engine.for_each_leaf(|leaf| all.entry(leaf.triangle).or_default().push(*leaf));
-    all
-}
-
-/// Barycentric coordinates in the leaf, of a point of its triangle.
-fn inside(leaf: &Leaf, point: [f64; 3]) -> [f64; 3] {
-    let [a, b, c] = leaf
-        .corners
-        .map(|corner| corner.weights().map(f64::from))
-        .map(|[_, b1, b2]| glam::DVec2::new(b1, b2));
-    let p = glam::DVec2::new(point[1], point[2]);
-    let area = (b - a).perp_dot(c - a);
-    [
-        (b - p).perp_dot(c - p) / area,
-        (c - p).perp_dot(a - p) / area,
-        (a - p).perp_dot(b - p) / area,
-    ]
-}
-
-/// A pixel's owner, and where in it the pixel is.
-type Place = (u32, [f64; 3]);
-
-/// The view's reference, and the places of the covered pixels.
-fn pixels(scene: &Scene) -> (ReferenceImage, Vec<Option<Place>>) {
-    let world = World::new(scene);
-    let view = world.view(scene.camera(), SIZE.0, SIZE.1);
-    let reference = ReferenceImage::render(&world, &view, 2);
-    let points = reference.ids.iter().zip(0i32..).map(|(&id, index)| {
-        let triangle = world.triangles.get(id as usize)?;
-        let corners = triangle.map(|v| view.project(world.positions.get(v as usize)));
-        let (x, y) = (index % SIZE.0 as i32, index / SIZE.0 as i32);
-        let edges = TrianglePlanes::new(corners).edges_at_pixel(x, y);
-        Some((id, normalized_weights(edges.map(|e| e.max(0.0)))))
-    });
-    let points = points.collect();
-    (reference, points)
-}
-
 #[test]
 fn leaves_divide_every_visible_triangle_and_colour_its_pixels_as_they_say() {
     let scene = Scene::parse(SCENE, "leaves.ron").expect("the scene is valid");
-    let (reference, points) = pixels(&scene);
+    let (reference, points) = pixels(&scene, SIZE);
     let mut engine = engine(&scene, Method::Adaptive);
     let mut frame = Frame::new(SIZE.0, SIZE.1);
     engine.for_each_leaf(|leaf| panic!("there is no image yet, but {leaf:?}"));

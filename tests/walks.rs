@@ -1,0 +1,194 @@
+//! Random walks through the refinement of whole images: frames of any budgets, spare time, and views given up. Whatever was done, every
+//! pixel is in one leaf, and colours have no step where two interpolated leaves meet, be it inside a triangle or between two: a vertex of
+//! one in the middle of the other's edge (a T-junction) would make one.
+
+#[path = "support/leaves.rs"]
+mod support;
+
+use specula::frame::{Leaf, LeafKind};
+use specula::scene::World;
+use specula::{Budget, Engine, EngineOptions, Frame, Scene};
+use std::collections::HashMap;
+use support::{Place, inside, leaves, pixels};
+
+const SIZE: (u32, u32) = (320, 240);
+
+/// Under enough lights for subdivision to pay: smooth shapes, creases, borders of materials, and a floor that fills much of the image.
+fn scene(shapes: &str) -> Scene {
+    let light = |i: i32| {
+        let (x, y) = (f64::from(i % 5) * 2.0 - 4.0, f64::from(i / 5) * 1.5 - 7.0);
+        let z = 3.0 + f64::from(i * 7 % 4);
+        let bright = 0.1 + 0.2 * f64::from(i32::from(i % 6 == 0));
+        format!("Point(position: ({x}, {y}, {z}), intensity: {bright}),")
+    };
+    let lights: String = (0..20).map(light).collect();
+    let text = format!(
+        "(camera: Perspective(position: (3.0, -7.0, 4.0), target: (0.0, 0.0, 0.7), fov_degrees: 38.0),
+        lights: [{lights}],
+        materials: {{
+            \"a\": (diffuse: (0.5, 0.2, 0.1), specular: 0.8, shininess: 60),
+            \"b\": (diffuse: (0.1, 0.3, 0.5), specular: 0.6, shininess: 15, model: BlinnPhong),
+        }},
+        objects: [{shapes}])"
+    );
+    Scene::parse(&text, "walks.ron").expect("the scene is valid")
+}
+
+/// `splitmix64`.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ z >> 31) % n
+    }
+}
+
+/// Every pixel that a triangle owns is in exactly one of its leaves; on a border it may touch several.
+fn check_pixels(points: &[Option<Place>], all: &HashMap<u32, Vec<Leaf>>) {
+    for (index, place) in points.iter().enumerate() {
+        let Some((triangle, point)) = *place else {
+            continue;
+        };
+        let of_triangle = &all[&triangle];
+        let least = |leaf| inside(leaf, point).into_iter().fold(f64::MAX, f64::min);
+        let holders = of_triangle.iter().filter(|leaf| least(leaf) >= -1e-9);
+        assert!(holders.count() >= 1, "pixel {index} is in no leaf");
+        let holders = of_triangle.iter().filter(|leaf| least(leaf) > 1e-9);
+        assert!(holders.count() <= 1, "pixel {index} is in several leaves");
+    }
+}
+
+/// Whether the image shows the colours of its corners.
+fn is_interpolated(leaf: &Leaf) -> bool {
+    leaf.is_painted && leaf.kind == LeafKind::Interpolated && leaf.pixels > 0
+}
+
+fn colour_at(leaf: &Leaf, weights: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        (0..3)
+            .map(|k| weights[k] * f64::from(leaf.colours[k][c]))
+            .sum()
+    })
+}
+
+/// The vertices of an edge of the world, ascending.
+fn ends(triangle: [u32; 3], k: usize) -> [u32; 2] {
+    let [a, b] = [triangle[k], triangle[(k + 1) % 3]];
+    [a.min(b), a.max(b)]
+}
+
+/// Colours of two interpolated leaves agree wherever they meet. Returns how many points between two leaves were compared, inside
+/// triangles and between them.
+fn check_edges(
+    world: &World,
+    by_edge: &HashMap<[u32; 2], Vec<u32>>,
+    all: &HashMap<u32, Vec<Leaf>>,
+) -> [u32; 2] {
+    let mut compared = [0; 2];
+    for (&triangle, own) in all {
+        let vertices = world.triangles[triangle as usize];
+        for leaf in own.iter().filter(|leaf| is_interpolated(leaf)) {
+            for (k, t) in (0..3).flat_map(|k| [0.0, 0.25, 0.5, 0.75].map(|t| (k, t))) {
+                let mut weights = [0.0; 3];
+                (weights[k], weights[(k + 1) % 3]) = (1.0 - t, t);
+                let colour = colour_at(leaf, weights);
+                let corners = leaf.corners.map(|corner| corner.weights().map(f64::from));
+                let point: [f64; 3] =
+                    std::array::from_fn(|i| (0..3).map(|c| weights[c] * corners[c][i]).sum());
+                let mut compare = |other: &Leaf, point: [f64; 3]| {
+                    let weights = inside(other, point);
+                    let meets = weights.iter().all(|&w| w >= -1e-9);
+                    if !(is_interpolated(other) && meets) || std::ptr::eq(other, leaf) {
+                        return;
+                    }
+                    let there = colour_at(other, weights);
+                    let step = (0..3)
+                        .map(|c| (there[c] - colour[c]).abs())
+                        .fold(0.0, f64::max);
+                    assert!(
+                        step < 1e-5,
+                        "a step of {step} between {leaf:?} and {other:?}"
+                    );
+                    compared[usize::from(other.triangle != triangle)] += 1;
+                };
+                own.iter().for_each(|other| compare(other, point));
+                // The same place on a triangle beyond the edge of this one that it is on, if it is on any.
+                for edge in (0..3).filter(|&edge| point[(edge + 2) % 3].abs() < 1e-12) {
+                    let neighbours = &by_edge[&ends(vertices, edge)];
+                    for &neighbour in neighbours.iter().filter(|&&n| n != triangle) {
+                        let theirs = world.triangles[neighbour as usize];
+                        let there = theirs.map(|vertex| {
+                            let place = vertices.iter().position(|&own| own == vertex);
+                            place.map_or(0.0, |place| point[place])
+                        });
+                        let leaves = all.get(&neighbour).into_iter().flatten();
+                        leaves.for_each(|other| compare(other, there));
+                    }
+                }
+            }
+        }
+    }
+    compared
+}
+
+fn walk(shapes: &str, seeds: std::ops::Range<u64>) -> [u32; 3] {
+    let mut scene = scene(shapes);
+    let camera = *scene.camera();
+    let world = World::new(&scene);
+    let mut by_edge: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
+    for (&triangle, number) in world.triangles.iter().zip(0..) {
+        for k in 0..3 {
+            by_edge.entry(ends(triangle, k)).or_default().push(number);
+        }
+    }
+    let (_, points) = pixels(&scene, SIZE);
+    let mut seen = [0; 3];
+    for seed in seeds {
+        let mut random = Random(seed);
+        let options = EngineOptions {
+            threads: Some(1),
+            ..EngineOptions::default()
+        };
+        let mut engine = Engine::with_options(&scene, options).expect("the options are valid");
+        let mut frame = Frame::new(SIZE.0, SIZE.1);
+        for _ in 0..12 {
+            if random.below(6) == 0 {
+                // A look at something else, which may be interrupted.
+                let mut other = camera;
+                other.position.x += 0.5;
+                scene.set_camera(other);
+                engine.render(&scene, Budget::Work(random.below(50_000)), &mut frame);
+                scene.set_camera(camera);
+            }
+            let units = 3_000 << random.below(8);
+            let stats = engine.render(&scene, Budget::Work(units), &mut frame);
+            let all = leaves(&engine);
+            check_pixels(&points, &all);
+            let [inside, between] = check_edges(&world, &by_edge, &all);
+            seen = [seen[0] + inside, seen[1] + between, seen[2] + 1];
+            if stats.converged {
+                break;
+            }
+        }
+    }
+    seen
+}
+
+#[test]
+fn leaves_fit_together_after_any_frames() {
+    let scenes = [
+        "(shape: Sphere(slices: 7, stacks: 5), material: \"a\", position: (0.0, 0.0, 1.0), scale: 1.6)",
+        "(shape: Teapot(tessellation: 2), material: \"a\"), (shape: Plane(width: 9.0, depth: 9.0, columns: 3, rows: 3), material: \"b\")",
+        "(shape: Box(size: (2.0, 2.0, 1.5)), material: \"b\"), (shape: Plane(width: 9.0, depth: 9.0, columns: 2, rows: 2), material: \"a\")",
+    ];
+    let mut all = [0; 3];
+    for shapes in scenes {
+        let seen = walk(shapes, 0..8);
+        println!("{seen:?} points inside triangles, between them, and frames: {shapes}");
+        all = std::array::from_fn(|i| all[i] + seen[i]);
+    }
+    assert!(all[0] > 1_000 && all[1] > 1_000 && all[2] > 100, "{all:?}");
+}
