@@ -322,6 +322,8 @@ fn render_prints_one_json_object_per_frame() {
                 "outcome",
                 "converged",
                 "estimated_error",
+                "error_bound",
+                "unproved_share",
                 "pht",
                 "pht_visible",
                 "refined",

@@ -2,7 +2,7 @@
 
 use super::args::{Machine, budget, count, milliseconds, name_of, require_png, time};
 use super::console::{Output, note};
-use super::report::{label, list};
+use super::report::{certificate, label, list};
 use super::{Failure, animate};
 use clap::Args;
 use serde_json::{Map, Value, json};
@@ -200,6 +200,7 @@ impl Report<'_> {
             let error = stats.estimated_error;
             lines.push(format!("  error       about {error:.2} codes (estimate)"));
         }
+        lines.extend(certificate(stats).map(|line| line.replacen("proved", "proved ", 1)));
         lines.join("\n")
     }
 

@@ -73,6 +73,18 @@ pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
     })
 }
 
+/// What is proved of the image, in words.
+pub(super) fn certificate(stats: &FrameStats) -> Option<String> {
+    let (bound, share) = stats.error_bound.zip(stats.unproved_share)?;
+    let right = format!("{:.1} % of the pixels within a code", (1.0 - share) * 100.0);
+    let rest = match bound {
+        _ if share == 0.0 => String::new(),
+        1.0.. => ", nothing of the others".to_owned(),
+        _ => format!(", the others within {:.0}", bound * 255.0),
+    };
+    Some(format!("  proved     {right}{rest}"))
+}
+
 impl FrameReport {
     /// One object.
     pub(super) fn json(&self) -> Value {
@@ -117,6 +129,7 @@ impl FrameReport {
                 stats.estimated_error
             ));
         }
+        lines.extend(certificate(stats));
         if let Some(error) = &self.error {
             lines.push(measured(error));
         }

@@ -1,7 +1,7 @@
 //! Bounds of a light's factors that hold on every triangle of a cluster.
 //!
 //! They follow the same plan as those of a single triangle (modules `cone` and [`bound`](super::bound)), but what is known of directions is
-//! less: not the three at the corners, but, for `X = p x` with unit `x` anywhere on the cluster, a [`Fan`]:
+//! less: not the three at the corners, but, for `X = p x` with unit `x` anywhere on the cluster, a **fan**:
 //!
 //! * a cone that holds them all;
 //! * a **step**, not less than `|x_i - x_j|` nor `|X_i - X_j| / p` for two corners of the same triangle;
@@ -19,8 +19,8 @@
 //! ```
 //!
 //! since `|f_i - f_j| <= |x_i - x_j| + |y_i - y_j|`. So deviations stay of second order in the size of **triangles**, however large the cluster
-//! is; only the greatest cosine, on which a highlight depends exponentially, is first order in the size of the cluster. In a fine mesh a
-//! cluster is small, and most are proved to need no evaluation at all, for a hundredth of what it costs to ask each triangle.
+//! is; only the greatest cosine, on which a highlight depends exponentially, is first order in the size of the cluster. So clusters
+//! near a highlight are not ruled out, though most of their triangles would be; runs of few triangles lose the least.
 
 use super::bound::{
     FLUSHED, FactorBound, Halfway, LightBound, clamped, halfway_cone, is_flushed, phong_deviation,

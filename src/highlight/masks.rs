@@ -25,8 +25,8 @@
 //! | the same over parts, and on an edge interpolated by another quadratic | `(1 + 5/3 * 5/4) D` | `(1 + 1/8 + 5/3 * 1/4) (hi - lo)` |
 //!
 //! (The Lebesgue constants of quadratic interpolation are 5/4 on an edge and 5/3 on a triangle: the greatest sum of the absolute values of its basis, of
-//! which those of the corners are not less than -1/8 each.) The last line is [`ANY_FORM`] and holds for all of them, the third
-//! [`QUADRATIC`]. Where light may be off by `e` either way and is at least `lo`, it is off by at most `encode(max(lo, e)) - encode(max(lo, e) - e)`
+//! which those of the corners are not less than -1/8 each.) The last line is `ANY_FORM` and holds for all of them, the third
+//! `QUADRATIC`. Where light may be off by `e` either way and is at least `lo`, it is off by at most `encode(max(lo, e)) - encode(max(lo, e) - e)`
 //! in code.
 //!
 //! A term that is absent has `hi = 0` and costs nothing. What [`shade_lanes`](crate::illumination::shade_lanes) itself errs is not part of it.

@@ -139,14 +139,22 @@ pub(in crate::frame) fn usual_lights(lights: usize) -> usize {
     lights.min(1 + lights / 8)
 }
 
-/// Whether finding out which lights a root needs may save more than it costs: perhaps half of them can be left out.
-fn bounds_pay(pixels: u32, lights: usize) -> bool {
-    cost::light_saved(pixels as f32) * lights as f32 * 0.5 >= cost::bounds(lights)
+/// Whether finding out which lights a root needs may save more than it costs: perhaps half of them can be left out, or every other
+/// triangle is right as it is, of those that seem so.
+fn bounds_pay(root: &Root, lights: usize) -> bool {
+    let pixels = root.pixels as f32;
+    let saved = if root.prior <= ranking::LOOK_ERROR {
+        // There may be nothing to be done.
+        cost::phong(pixels, lights)
+    } else {
+        cost::light_saved(pixels) * lights as f32
+    };
+    saved * 0.5 >= cost::bounds(lights)
 }
 
 /// Whether anything can be found out about a root before it is shaded.
-pub(super) fn is_lookable(pixels: u32, lights: usize) -> bool {
-    bounds_pay(pixels, lights) || runs::pay(pixels, lights)
+pub(super) fn is_lookable(root: &Root, lights: usize) -> bool {
+    bounds_pay(root, lights) || runs::pay(root.pixels, lights)
 }
 
 impl Refinement {
@@ -404,7 +412,7 @@ impl Refinement {
     /// Nominal cost of finding out which terms a root needs.
     pub(super) fn look_cost(&self, stage: &Stage<'_>, root: &Root) -> f32 {
         let lights = stage.world.lights.len();
-        if bounds_pay(root.pixels, lights) {
+        if bounds_pay(root, lights) {
             cost::bounds(lights)
         } else if runs::pay(root.pixels, lights) && self.runs.is_unknown(stage.world, root.triangle)
         {
@@ -423,7 +431,7 @@ impl Refinement {
             return (everything, Claim::UNKNOWN);
         }
         self.units_for_bounds += self.look_cost(stage, &root) as u64;
-        if bounds_pay(root.pixels, count) {
+        if bounds_pay(&root, count) {
             let view = stage.view;
             let lights =
                 highlight::light_masks(stage.world, &view.eye, view.encoding, root.triangle);
