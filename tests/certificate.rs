@@ -1,6 +1,10 @@
 //! What a frame certifies is true: no pixel is further from per-pixel Phong shading than [`FrameStats::error_bound`] says, no more pixels
 //! than it says by more than a code, on every scene that comes along and thousands of random ones, after any frames.
 
+#[path = "support/random.rs"]
+mod random;
+
+use random::Random;
 use rayon::prelude::*;
 use specula::glam::{DMat4, DVec3};
 use specula::measure::{ErrorReport, ReferenceImage};
@@ -128,28 +132,9 @@ fn certificates_hold_while_the_scenes_that_come_along_are_refined() {
     assert!(count(|chain| chain.knows_all) >= 3, "{checked:?}");
 }
 
-/// `splitmix64`.
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn below(&mut self, n: u64) -> u64 {
-        self.bits() % n
-    }
-
-    fn between(&mut self, lo: f64, hi: f64) -> f64 {
-        lo + (hi - lo) * self.unit()
-    }
+/// Evenly from `lo` to `hi`.
+fn between(random: &mut Random, lo: f64, hi: f64) -> f64 {
+    lo + (hi - lo) * (random.bits() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// A scene of some shapes under some lights, as chance has it.
@@ -167,8 +152,8 @@ fn random_scene(random: &mut Random) -> String {
     );
     let many = if random.below(4) == 0 { 24 } else { 4 };
     for _ in 0..1 + random.below(many) {
-        let [x, y, z] = [0, 1, 2].map(|_| random.between(-1.0, 1.0));
-        let bright = random.between(0.1, 1.5);
+        let [x, y, z] = [0, 1, 2].map(|_| between(random, -1.0, 1.0));
+        let bright = between(random, 0.1, 1.5);
         let _ = if random.below(3) == 0 {
             writeln!(
                 w,
@@ -176,20 +161,20 @@ fn random_scene(random: &mut Random) -> String {
                 y + 0.01
             )
         } else {
-            let far = random.between(1.5, 9.0);
+            let far = between(random, 1.5, 9.0);
             let [x, y, z] = [x, y - 0.5, z + 0.5].map(|c| c * far);
             writeln!(w, "Point(position: ({x}, {y}, {z}), intensity: {bright}),")
         };
     }
     let _ = writeln!(w, "], materials: {{");
     for name in ["a", "b"] {
-        let [r, g, b] = [0, 1, 2].map(|_| random.between(0.0, 0.9));
+        let [r, g, b] = [0, 1, 2].map(|_| between(random, 0.0, 0.9));
         let specular = if random.below(5) == 0 {
             0.0
         } else {
-            random.between(0.1, 0.9)
+            between(random, 0.1, 0.9)
         };
-        let shininess = 10_f64.powf(random.between(0.0, 3.0));
+        let shininess = 10_f64.powf(between(random, 0.0, 3.0));
         let model = ["Phong", "BlinnPhong"][random.below(2) as usize];
         let two_sided = random.below(3) == 0;
         let _ = writeln!(
@@ -213,7 +198,7 @@ fn random_scene(random: &mut Random) -> String {
             3 => "Box(size: (1.5, 1.0, 0.7))".to_owned(),
             _ => format!("Sphere(slices: {}, stacks: 4)", 3 + random.below(6)),
         };
-        let [x, y, z] = [1.5, 2.0, 1.0].map(|far| random.between(-far, far));
+        let [x, y, z] = [1.5, 2.0, 1.0].map(|far| between(random, -far, far));
         let material = ["a", "b"][random.below(2) as usize];
         let _ = writeln!(
             w,
@@ -239,7 +224,11 @@ fn check_random(seed: u64) -> Result<u64, String> {
     for turn in 0..2 {
         if turn > 0 {
             let object = random.below(scene.objects().len() as u64) as usize;
-            let by = DVec3::new(random.between(-0.3, 0.3), random.between(-0.3, 0.3), 0.1);
+            let by = DVec3::new(
+                between(&mut random, -0.3, 0.3),
+                between(&mut random, -0.3, 0.3),
+                0.1,
+            );
             let moved = DMat4::from_translation(by) * scene.objects()[object].author_from_mesh;
             scene.set_transform(object, moved);
         }
@@ -251,7 +240,7 @@ fn check_random(seed: u64) -> Result<u64, String> {
         };
         let patience = 1 + random.below(12);
         for _ in 0..patience {
-            let units = 10_f64.powf(random.between(3.0, 5.0)) as u64;
+            let units = 10_f64.powf(between(&mut random, 3.0, 5.0)) as u64;
             let stats = refining.render(&scene, Budget::Work(units), &mut frame);
             chain
                 .follow(&stats, &frame, &phong)

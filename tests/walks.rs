@@ -2,9 +2,12 @@
 //! pixel is in one leaf, and colours have no step where two interpolated leaves meet, be it inside a triangle or between two: a vertex of
 //! one in the middle of the other's edge (a T-junction) would make one.
 
+#[path = "support/random.rs"]
+mod random;
 #[path = "support/leaves.rs"]
 mod support;
 
+use random::Random;
 use specula::backend::BackendKind;
 use specula::frame::{Leaf, LeafKind};
 use specula::scene::World;
@@ -34,18 +37,6 @@ fn scene(shapes: &str) -> Scene {
         objects: [{shapes}])"
     );
     Scene::parse(&text, "walks.ron").expect("the scene is valid")
-}
-
-/// `splitmix64`.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ z >> 31) % n
-    }
 }
 
 /// Every pixel that a triangle owns is in exactly one of its leaves; on a border it may touch several.

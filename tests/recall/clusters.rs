@@ -1,19 +1,16 @@
 //! What is said of a whole cluster holds on each of its triangles; and what is claimed of pictures in the making, of each form they take.
 
 use super::cases::{Case, Kind, Random, blend, random_case, single};
-use super::{MOST_CODES, Tally, check_factors, search};
+use super::{MOST_CODES, Tally, check_factors, scenes_that_come_along, search};
 use glam::DVec3;
 use rayon::prelude::*;
 use specula::geometry::build_clusters;
+use specula::geometry::clusters::RUN;
 use specula::highlight::{Claim, ClusterBound, ClusterShape, TriangleLights, cluster_masks};
 use specula::illumination::reference::factors;
 use specula::output::Encoding;
-use specula::scene::{Eye, Scene, World};
+use specula::scene::{Eye, World};
 use std::ops::Range;
-use std::path::Path;
-
-/// Triangles that are looked at together.
-const RUN: usize = 16;
 
 /// One triangle of a cluster against what is said of all of them.
 fn check_triangle(
@@ -72,15 +69,9 @@ fn check_run(world: &World, eye: Eye, run: Range<u32>, seed: u64) -> Result<Tall
 
 #[test]
 fn nothing_is_missed_on_the_clusters_of_the_scenes_that_come_along() {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let mut all = Tally::default();
-    for entry in directory.read_dir().expect("the folder of scenes") {
-        let path = entry.expect("an entry").path();
-        if path.extension().is_none_or(|ending| ending != "ron") {
-            continue;
-        }
-        let world = World::new(&Scene::load(&path).expect("a scene that comes along is valid"));
-        let scene = Scene::load(&path).expect("a scene that comes along is valid");
+    for (path, scene) in scenes_that_come_along() {
+        let world = World::new(&scene);
         let view = world.view(scene.camera(), 1280, 720);
         let step = if cfg!(debug_assertions) { 37 } else { 3 };
         let tally = (0..world.clusters.len())

@@ -14,7 +14,7 @@ use specula::output::Encoding;
 use specula::scene::{Scene, ShadingLight, World};
 use std::fmt;
 use std::ops::Add;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Of the search itself, in `f64`.
 const ROUNDING: f64 = 1e-12;
@@ -192,17 +192,23 @@ fn nothing_is_missed_on_random_triangles() {
     assert!(all.worst_codes > 0.4, "{all}");
 }
 
+/// The scenes that come along, and where they are.
+fn scenes_that_come_along() -> impl Iterator<Item = (PathBuf, Scene)> {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let entries = directory.read_dir().expect("the folder of scenes");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let paths = paths.filter(|path| path.extension().is_some_and(|ending| ending == "ron"));
+    paths.map(|path| {
+        let scene = Scene::load(&path).expect("a scene that comes along is valid");
+        (path, scene)
+    })
+}
+
 /// Every triangle of every scene that comes along under each of its lights, and under all of them together.
 #[test]
 fn nothing_is_missed_in_the_scenes_that_come_along() {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let mut scenes = 0;
-    for entry in directory.read_dir().expect("the folder of scenes") {
-        let path = entry.expect("an entry").path();
-        if path.extension().is_none_or(|ending| ending != "ron") {
-            continue;
-        }
-        let scene = Scene::load(&path).expect("a scene that comes along is valid");
+    for (path, scene) in scenes_that_come_along() {
         let tally = check_scene(&scene).unwrap_or_else(|what| panic!("{}: {what}", path.display()));
         println!("{}: {tally}", path.display());
         assert!(tally.deviates > 0 && tally.ruled_out > 0, "{tally}");

@@ -31,7 +31,7 @@ const SPLIT_YIELD: f32 = 0.5;
 const CURIOSITY: f32 = 4.0;
 
 /// Mean squared error, in squared codes, up to which a triangle is looked at before it is shaded.
-pub(super) const LOOK_ERROR: f32 = 0.25;
+const LOOK_ERROR: f32 = 0.25;
 
 /// It is looked at so much sooner than it would be shaded: that costs a fraction, and may be all there is to do.
 const LOOK_FIRST: f32 = 8.0;
@@ -159,7 +159,7 @@ impl RootRanking<'_> {
     /// Whether it is to be found out whether a triangle needs any refinement before it gets some.
     fn is_looked_at(&self, root: &Root) -> bool {
         let is_right_by_guess = root.prior <= LOOK_ERROR && !self.is_drawn_once;
-        is_right_by_guess && root.shading == NONE && is_lookable(root, self.lights)
+        is_right_by_guess && root.shading == NONE && is_lookable(root.pixels, self.lights)
     }
 
     /// Nominal cost of making a triangle of `pixels` pixels a leaf that can be split.

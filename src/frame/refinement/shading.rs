@@ -139,22 +139,15 @@ pub(in crate::frame) fn usual_lights(lights: usize) -> usize {
     lights.min(1 + lights / 8)
 }
 
-/// Whether finding out which lights a root needs may save more than it costs: perhaps half of them can be left out, or every other
-/// triangle is right as it is, of those that seem so.
-fn bounds_pay(root: &Root, lights: usize) -> bool {
-    let pixels = root.pixels as f32;
-    let saved = if root.prior <= ranking::LOOK_ERROR {
-        // There may be nothing to be done.
-        cost::phong(pixels, lights)
-    } else {
-        cost::light_saved(pixels) * lights as f32
-    };
-    saved * 0.5 >= cost::bounds(lights)
+/// Whether finding out which lights a root needs may save more than it costs: perhaps half of them can be left out. That must depend on
+/// nothing but its pixels, lest final images depend on what was guessed of it.
+fn bounds_pay(pixels: u32, lights: usize) -> bool {
+    cost::light_saved(pixels as f32) * lights as f32 * 0.5 >= cost::bounds(lights)
 }
 
 /// Whether anything can be found out about a root before it is shaded.
-pub(super) fn is_lookable(root: &Root, lights: usize) -> bool {
-    bounds_pay(root, lights) || runs::pay(root.pixels, lights)
+pub(super) fn is_lookable(pixels: u32, lights: usize) -> bool {
+    bounds_pay(pixels, lights) || runs::pay(pixels, lights)
 }
 
 impl Refinement {
@@ -412,7 +405,7 @@ impl Refinement {
     /// Nominal cost of finding out which terms a root needs.
     pub(super) fn look_cost(&self, stage: &Stage<'_>, root: &Root) -> f32 {
         let lights = stage.world.lights.len();
-        if bounds_pay(root, lights) {
+        if bounds_pay(root.pixels, lights) {
             cost::bounds(lights)
         } else if runs::pay(root.pixels, lights) && self.runs.is_unknown(stage.world, root.triangle)
         {
@@ -431,7 +424,7 @@ impl Refinement {
             return (everything, Claim::UNKNOWN);
         }
         self.units_for_bounds += self.look_cost(stage, &root) as u64;
-        if bounds_pay(&root, count) {
+        if bounds_pay(root.pixels, count) {
             let view = stage.view;
             let lights =
                 highlight::light_masks(stage.world, &view.eye, view.encoding, root.triangle);
@@ -459,13 +452,11 @@ impl Refinement {
         (shading, lights.claim)
     }
 
-    /// Whether the picture shows the triangle within a code of what it should be, whatever is interpolated. The proof is about linear
-    /// interpolation over all of it; the claim covers what else it may show, being subdivided or curved, or having been so in an image that
-    /// parts were kept of.
+    /// Whether a triangle is proved right, and the picture shows it as the proof has it, linear over all of it: not subdivided, nor curved, nor
+    /// kept from an image in which it may have been.
     fn is_right_as_it_is(&self, stage: &Stage<'_>, root: &Root, lights: &TriangleLights) -> bool {
-        let is_whole = stage.base.is_whole() && !self.forest.is_planted(root.triangle);
-        lights.verdict == Verdict::Absent
-            && (is_whole && !root.is_curved || lights.claim.interpolated <= RIGHT)
+        let is_changed = root.is_curved || self.forest.is_planted(root.triangle);
+        lights.verdict == Verdict::Absent && !is_changed && stage.base.is_whole()
     }
 }
 

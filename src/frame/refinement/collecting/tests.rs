@@ -173,7 +173,7 @@ fn expected(exec: Exec, image: &Image, method: Method) -> Vec<Expected> {
                 let shade = benefit / cost::phong(area, lights.min(1 + lights / 8));
                 let split = 0.5 * benefit * (15.0 / 16.0) / split;
                 // Its bounds, or those of its run.
-                let own = cost::phong(area, lights) * 0.5 >= cost::bounds(lights);
+                let own = cost::light_saved(area) * lights as f32 * 0.5 >= cost::bounds(lights);
                 let is_lookable =
                     own || cost::phong(area, lights) * 8.0 >= cost::run_bounds(lights);
                 match () {
