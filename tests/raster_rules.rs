@@ -6,7 +6,7 @@ mod support;
 use specula::backend::software::{NO_TRIANGLE, SoftwareBackend};
 use specula::backend::{Backend, BasePaint};
 use specula::geometry::curved::{node_count, node_index, part_index, part_nodes, through};
-use specula::geometry::{CurvedTriangles, Vec3s};
+use specula::geometry::{CurvedTriangles, TriangleSet, Vec3s};
 use specula::illumination::reference::shade;
 use specula::output::Frame;
 use specula::output::encode::{encode, encode_u8};
@@ -444,8 +444,18 @@ fn curved_at_random(random: &mut Random, triangles: u32) -> CurvedTriangles {
     curved
 }
 
+/// Every third triangle or so, curved or not.
+fn lit_at_random(random: &mut Random, triangles: u32) -> TriangleSet {
+    let mut lit = TriangleSet::default();
+    lit.clear(triangles as usize);
+    (0..triangles)
+        .filter(|_| random.range(0.0, 3.0) < 1.0)
+        .for_each(|triangle| lit.insert(triangle));
+    lit
+}
+
 #[test]
-fn gouraud_curved_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
+fn gouraud_mixed_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
     let mut random = Random(8);
     let (world, colours) = colourful(&mut random);
     let view = perspective(150, 100, 90.0, 0.1, 50.0);
@@ -457,9 +467,11 @@ fn gouraud_curved_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
     let all = 0..world.triangles.len() as u32;
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
     let curved = curved_at_random(&mut random, all.end);
-    let curved_paint = BasePaint::Curved {
+    let lit = lit_at_random(&mut random, all.end);
+    let mixed_paint = BasePaint::Mixed {
         colours: &colours,
         curved: &curved,
+        lit: &lit,
     };
     let mut backend = SoftwareBackend::new();
     for exec in levels() {
@@ -467,7 +479,7 @@ fn gouraud_curved_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
         let ids = Visibility::of(&backend).ids;
         for (paint, name) in [
             (BasePaint::Gouraud(&colours), "gouraud"),
-            (curved_paint, "curved"),
+            (mixed_paint, "mixed"),
             (BasePaint::Flat(&flat_colours), "flat"),
             (BasePaint::Phong, "phong"),
         ] {
@@ -489,29 +501,31 @@ fn gouraud_curved_flat_and_phong_pixels_are_what_the_scalar_rules_say() {
                             world.triangles[id as usize].map(|v| attribute.get(v as usize));
                         std::array::from_fn(|k| (0..3).map(|c| w[c] * corners[c][k]).sum())
                     };
+                    let mut illuminated = || {
+                        let to_f64 = |v: [f32; 3]| glam::DVec3::from_array(v.map(f64::from));
+                        let shaded = shade(
+                            to_f64(mix(&world.positions)),
+                            to_f64(mix(&world.normals)),
+                            &view.eye,
+                            &world.materials[usize::from(world.triangle_material[id as usize])],
+                            &world.lights,
+                        );
+                        at_horizon = shaded.smallest_cosine < 1e-4;
+                        shaded.rgb
+                    };
                     match paint {
                         BasePaint::Gouraud(colours) | BasePaint::Refined { colours, .. } => {
                             mix(colours).map(f64::from)
                         }
-                        BasePaint::Curved { colours, curved } => curved
+                        BasePaint::Mixed { lit, .. } if lit.contains(id) => illuminated(),
+                        BasePaint::Mixed {
+                            colours, curved, ..
+                        } => curved
                             .colour(id, w[1], w[2])
                             .unwrap_or_else(|| mix(colours))
                             .map(f64::from),
                         BasePaint::Flat(colours) => colours.get(id as usize).map(f64::from),
-                        BasePaint::Phong => {
-                            let to_f64 = |v: [f32; 3]| glam::DVec3::from_array(v.map(f64::from));
-                            {
-                                let shaded = shade(
-                                    to_f64(mix(&world.positions)),
-                                    to_f64(mix(&world.normals)),
-                                    &view.eye,
-                                    &world.materials[0],
-                                    &world.lights,
-                                );
-                                at_horizon = shaded.smallest_cosine < 1e-4;
-                                shaded.rgb
-                            }
-                        }
+                        BasePaint::Phong => illuminated(),
                     }
                 };
                 for k in 0..3 {
@@ -544,11 +558,13 @@ fn colours_do_not_depend_on_threads() {
     let all = 0..world.triangles.len() as u32;
     let geometry = geometry(&world, &view, std::slice::from_ref(&all));
     let curved = curved_at_random(&mut random, all.end);
-    let curved_paint = BasePaint::Curved {
+    let lit = lit_at_random(&mut random, all.end);
+    let mixed_paint = BasePaint::Mixed {
         colours: &colours,
         curved: &curved,
+        lit: &lit,
     };
-    for paint in [BasePaint::Gouraud(&colours), curved_paint, BasePaint::Phong] {
+    for paint in [BasePaint::Gouraud(&colours), mixed_paint, BasePaint::Phong] {
         let draw = |exec| {
             let mut backend = SoftwareBackend::new();
             let mut frame = Frame::new(333, 222);

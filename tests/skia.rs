@@ -278,7 +278,7 @@ fn software_paints_over_its_first_image_in_order() {
         panic!("{} calls", calls.len());
     };
     assert!(matches!(first, Call::Rasterize { .. }));
-    assert_eq!(*second, Call::Resolve(Paint::Curved));
+    assert_eq!(*second, Call::Resolve(Paint::Mixed));
     assert!(!middle.is_empty());
     assert!(
         middle

@@ -25,7 +25,7 @@ pub mod suite;
 
 pub use kind::BackendKind;
 
-use crate::geometry::{Bary, CurvedTriangles, Quadratic, Vec3s};
+use crate::geometry::{Bary, CurvedTriangles, Quadratic, TriangleSet, Vec3s};
 use crate::illumination::ActiveLights;
 pub use crate::output::Interpolation;
 use crate::output::{Rect, Target};
@@ -104,12 +104,15 @@ pub struct RasterCounts {
 pub enum BasePaint<'a> {
     /// Linear colours of the world's vertices, interpolated (those of visible triangles are valid).
     Gouraud(&'a Vec3s),
-    /// Like `Gouraud`, but some triangles have curved colours. Only for backends that refine in place.
-    Curved {
+    /// Like `Gouraud`, but some triangles have curved colours, and at the pixels of others the illumination equation is evaluated, all
+    /// lights. Only for backends that refine in place.
+    Mixed {
         /// Linear colours of the world's vertices (those of visible triangles are valid).
         colours: &'a Vec3s,
-        /// Those triangles.
+        /// Those that have curved colours.
         curved: &'a CurvedTriangles,
+        /// Those that are illuminated at every pixel, whether they are curved or not.
+        lit: &'a TriangleSet,
     },
     /// One linear colour for each of the world's triangles (those of visible triangles are valid).
     Flat(&'a Vec3s),
@@ -323,6 +326,22 @@ pub trait Backend: Debug + Send + Sync {
 
     /// How many pixels [`present`](Self::present) would have to write to `target` now.
     fn pending_pixels(&self, target: &Target<'_>) -> u64;
+
+    /// At most how many pixels [`present`](Self::present) will have to write to `target` once the image has been resolved. Asked between
+    /// [`rasterize`](Self::rasterize) and [`resolve`](Self::resolve).
+    fn pending_after_resolve(
+        &self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        target: &Target<'_>,
+    ) -> u64 {
+        let (_, view) = (exec, geometry.view);
+        if (target.width(), target.height()) == (view.width, view.height) {
+            u64::from(view.width) * u64::from(view.height)
+        } else {
+            0
+        }
+    }
 
     /// Brings `target` up to the current image and marks it with its stamp; pixels known to be right already are not
     /// touched. Returns the number of pixels written, as told by [`pending_pixels`](Self::pending_pixels) just before.

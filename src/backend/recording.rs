@@ -63,8 +63,8 @@ pub enum Call {
 pub enum Paint {
     /// [`BasePaint::Gouraud`].
     Gouraud,
-    /// [`BasePaint::Curved`].
-    Curved,
+    /// [`BasePaint::Mixed`].
+    Mixed,
     /// [`BasePaint::Flat`].
     Flat,
     /// [`BasePaint::Phong`].
@@ -125,7 +125,7 @@ impl RecordingBackend {
     fn log_resolve(&self, paint: BasePaint<'_>) {
         self.log.push(Call::Resolve(match paint {
             BasePaint::Gouraud(_) => Paint::Gouraud,
-            BasePaint::Curved { .. } => Paint::Curved,
+            BasePaint::Mixed { .. } => Paint::Mixed,
             BasePaint::Flat(_) => Paint::Flat,
             BasePaint::Phong => Paint::Phong,
             BasePaint::Refined { parts, .. } => Paint::Refined(parts.to_vec()),
@@ -229,6 +229,15 @@ impl Backend for RecordingBackend {
 
     fn pending_pixels(&self, target: &Target<'_>) -> u64 {
         self.inner.pending_pixels(target)
+    }
+
+    fn pending_after_resolve(
+        &self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        target: &Target<'_>,
+    ) -> u64 {
+        self.inner.pending_after_resolve(exec, geometry, target)
     }
 
     fn present(&mut self, exec: Exec, target: &mut Target<'_>) -> u64 {

@@ -3,7 +3,7 @@
 use super::Method;
 use super::stats::FrameStats;
 use crate::backend::{Backend, BasePaint, Geometry, RasterCounts};
-use crate::geometry::Vec3s;
+use crate::geometry::{TriangleSet, Vec3s};
 use crate::illumination::{PointBatch, VertexSet};
 use crate::parallel::{Exec, Turn};
 use crate::refine::{Curving, CurvingRule};
@@ -27,6 +27,9 @@ pub(super) struct BaseImage {
     visible_triangles: u64,
     /// Which of them have curved colours.
     curving: Curving,
+    /// Which of them are illuminated at every pixel, unless all are.
+    lit: TriangleSet,
+    is_lit: bool,
 }
 
 impl BaseImage {
@@ -51,6 +54,33 @@ impl BaseImage {
 
     pub(super) fn curving_mut(&mut self) -> &mut Curving {
         &mut self.curving
+    }
+
+    /// Triangles that are illuminated at every pixel, empty at first.
+    pub(super) fn lit_mut(&mut self) -> &mut TriangleSet {
+        &mut self.lit
+    }
+
+    /// Has all pixels illuminated.
+    pub(super) fn light_everything(&mut self) {
+        self.is_lit = true;
+    }
+
+    /// Whether all pixels are illuminated.
+    pub(super) fn is_lit(&self) -> bool {
+        self.is_lit
+    }
+
+    /// Whether some triangles have other colours than interpolated ones.
+    pub(super) fn is_mixed(&self) -> bool {
+        self.is_lit || !self.lit.is_empty() || !self.curving.curved().is_empty()
+    }
+
+    /// Has all colours interpolated.
+    pub(super) fn unmix(&mut self, triangles: usize) {
+        self.curving.clear();
+        self.lit.clear(triangles);
+        self.is_lit = false;
     }
 
     /// Begins to divide large triangles, by a rule.
@@ -182,11 +212,12 @@ impl BaseImage {
         turn: Turn<'_>,
     ) -> bool {
         let paint = match method {
-            method if method.shades_first_image_per_pixel() => BasePaint::Phong,
+            method if self.is_lit || method.shades_first_image_per_pixel() => BasePaint::Phong,
             Method::Flat => BasePaint::Flat(&self.colours),
-            _ if !self.curving.curved().is_empty() => BasePaint::Curved {
+            _ if self.is_mixed() => BasePaint::Mixed {
                 colours: &self.colours,
                 curved: self.curving.curved(),
+                lit: &self.lit,
             },
             _ => BasePaint::Gouraud(&self.colours),
         };

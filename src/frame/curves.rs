@@ -20,6 +20,9 @@ const DIVISIONS: [u32; 4] = [1, 2, 4, MOST_DIVISIONS];
 /// A triangle is divided if that costs at most this share of what it would cost to shade its pixels.
 const SHARE: f32 = 0.7;
 
+/// Nominal nanoseconds that curving saves at a pixel, at least: a guard against division by none.
+const LEAST_SAVED_NS: f32 = 0.1;
+
 /// Images with fewer pixels to a visible triangle than this share of the least that is divided are not looked through.
 const LOOK_FROM: f32 = 0.25;
 
@@ -81,10 +84,18 @@ fn triangle_ns(n: u32, lights: usize) -> f32 {
     cost::curved(1.0, nodes as f32, part_count(n) as f32, lights)
 }
 
-/// Which triangles may be divided by how much: as much as their pixels pay for.
-fn rule(lights: usize) -> CurvingRule {
-    let pixel = SHARE * cost::phong_pixel(usual_lights(lights));
-    CurvingRule(DIVISIONS.map(|n| (triangle_ns(n, lights) / pixel).ceil() as u32))
+/// Which triangles may be divided by how much: as much as their pixels pay for, which would be shaded later else; or under a deadline, at
+/// once.
+fn rule(lights: usize, is_timed: bool) -> CurvingRule {
+    let later = SHARE * cost::phong_pixel(usual_lights(lights));
+    let at_once = SHARE * cost::lit_pixel(lights);
+    CurvingRule(DIVISIONS.map(|n| {
+        let saved = match at_once - cost::curved_pixel(n) {
+            saved if is_timed && saved < later => saved.max(LEAST_SAVED_NS),
+            _ => later,
+        };
+        (triangle_ns(n, lights) / saved).ceil() as u32
+    }))
 }
 
 /// Curves what the budget allows, `ending_ms` being what the first image and handing it over will take from then on.
@@ -103,7 +114,7 @@ pub(super) fn curve(
     ending_ms: f64,
 ) -> Curves {
     let lights = world.lights.len();
-    let rule = rule(lights);
+    let rule = rule(lights, allowance.is_timed());
     let least = LOOK_FROM * rule.0[0] as f32 * backend.visible_triangles().len() as f32;
     if (base.covered_pixels() as f32) < least {
         return Curves::default();
@@ -113,7 +124,14 @@ pub(super) fn curve(
     let mut done = CurvedLoad::default();
     let mut rounds = 0;
     let mut taken_back = false;
+    let cap: u32 = std::env::var("CAP")
+        .ok()
+        .and_then(|v| v.parse().ok())
+        .unwrap_or(8);
     for n in DIVISIONS {
+        if n > cap {
+            break;
+        }
         let next = CurvedLoad::of(&base.curving().with_round(n), lights);
         if next == done {
             break;
@@ -122,7 +140,7 @@ pub(super) fn curve(
             Some((recorded, _)) => rounds < recorded,
             None => {
                 let nodes = Load::of_items(next.nodes_ns - done.nodes_ns);
-                let ms = costs.predict_at_most_ms(Kind::Plan, nodes) + colouring_ms(costs, next);
+                let ms = costs.predict_at_most_ms(Kind::Curve, nodes) + colouring_ms(costs, next);
                 allowance.affords(next.units(), ms * CAUTION + ending_ms)
             }
         };

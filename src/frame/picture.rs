@@ -15,21 +15,23 @@
 //! Colours of the image before stay until `Colouring` begins, so it can be handed over until then. Where it is the image shown, colouring is
 //! not interrupted, lest a part of either is shown.
 
+mod composing;
 mod refining;
 
+pub(super) use composing::Composition;
 pub(super) use refining::Easel;
 
 use super::Method;
 use super::base::BaseImage;
 use super::baseline::Baseline;
-use super::curves::{self, CurvedLoad, Curves};
-use super::load::ImageLoad;
+use super::load::{self, ImageLoad, MARGIN_MS};
 use super::motion::Motion;
 use super::refine_first::RefineFirst;
 use super::refinement::Refinement;
 use super::stats::{FrameStats, StageTimes};
 use super::tiles::Tiles;
 use crate::backend::Backend;
+use crate::output::Target;
 use crate::parallel::{Exec, GoOn, Turn};
 use crate::refine::paper::PaperRule;
 use crate::scene::{View, World};
@@ -69,8 +71,10 @@ pub(super) struct Picture {
     is_begun: bool,
     /// What of the image before may be kept.
     motion: Motion,
-    /// How triangles of its first image are curved.
-    curves: Curves,
+    /// How its first image is composed.
+    composition: Composition,
+    /// Whether refinement has begun with its first image before that is complete.
+    is_planned: bool,
     /// Whether the stage in hand is yet to be begun.
     is_fresh: bool,
     /// What the stage in hand has taken in earlier frames, and in this one so far.
@@ -95,21 +99,6 @@ pub(super) struct Studio<'a> {
     pub(super) predicted: &'a mut StageTimes,
 }
 
-impl Studio<'_> {
-    /// Milliseconds that giving the image of `view` its colours will probably not exceed.
-    pub(super) fn colouring_ms(&self, view: &View, curved: CurvedLoad) -> f64 {
-        let load = self.colouring(view, curved);
-        self.costs.predict_at_most_ms(Kind::Resolve, load)
-    }
-
-    /// What giving the image of `view` its colours takes.
-    fn colouring(&self, view: &View, curved: CurvedLoad) -> Load {
-        let mut load = (self.load).resolve(self.method, self.world.lights.len(), view);
-        load.pixels_ns += curved.pixels_ns;
-        load
-    }
-}
-
 impl Picture {
     pub(super) fn new(backend: Box<dyn Backend>) -> Self {
         Self {
@@ -124,7 +113,8 @@ impl Picture {
             pass: Pass::Empty,
             is_begun: false,
             motion: Motion::default(),
-            curves: Curves::default(),
+            composition: Composition::default(),
+            is_planned: false,
             is_fresh: true,
             stage_ms: 0.0,
             right_in: None,
@@ -219,6 +209,7 @@ impl Picture {
     pub(super) fn shown_method(&self, method: Method) -> Method {
         match method {
             Method::PhongTiles if self.tiles.is_finished() => Method::Phong,
+            Method::Adaptive if self.base.is_lit() => Method::Phong,
             method => method,
         }
     }
@@ -298,53 +289,20 @@ impl Picture {
         true
     }
 
-    /// Divides large triangles, if the image lacks only its colours, and if there will be time for it beside giving it those and handing it
-    /// over, which takes `handing_over_ms`.
-    pub(super) fn curve(
-        &mut self,
-        studio: &mut Studio<'_>,
-        allowance: &Allowance<'_>,
-        handing_over_ms: f64,
-    ) {
-        let Some(view) = self
-            .view
-            .filter(|_| self.pass == Pass::Colouring && self.is_fresh)
-        else {
-            return;
+    /// Milliseconds that handing the image over, once it has got its colours, will probably not exceed, and a margin. In spare time there
+    /// is no target.
+    pub(super) fn handing_over_ms(&self, studio: &Studio<'_>, target: Option<&Target<'_>>) -> f64 {
+        let (Some(target), Some(view)) = (target, &self.view) else {
+            return MARGIN_MS;
         };
-        let was_curved = !self.base.curving().curved().is_empty();
-        self.base.curving_mut().clear();
-        self.curves = Curves::default();
-        let can_be = studio.method == Method::Adaptive
-            && self.divisor == 1
-            && self.backend.capabilities().refines_in_place()
-            // Tiles that are kept are not curved.
-            && (was_curved || !self.motion.has_its_light);
-        if !can_be {
-            return;
-        }
-        let ending_ms = (studio.colouring_ms(&view, self.curves.load) + handing_over_ms)
-            * studio.stages.slowness(studio.predicted);
-        let since = allowance.elapsed_ms();
-        self.curves = curves::curve(
-            &mut self.base,
-            studio.exec,
-            studio.world,
-            &view,
-            &*self.backend,
-            studio.costs,
-            allowance,
-            ending_ms,
-        );
-        studio.stages.refine += allowance.elapsed_ms() - since;
-        studio.predicted.refine += studio
-            .costs
-            .predict_ms(Kind::Plan, Load::of_items(self.curves.load.nodes_ns));
-    }
-
-    /// How triangles are curved.
-    pub(super) fn curves(&self) -> Curves {
-        self.curves
+        let pixels = if self.divisor == 1 {
+            let geometry = self.base.geometry(studio.world, view);
+            (self.backend).pending_after_resolve(studio.exec, geometry, target)
+        } else {
+            // Enlarged images are written as a whole.
+            u64::from(target.width()) * u64::from(target.height())
+        };
+        load::pixels_ms(studio.costs, pixels, self.divisor) + MARGIN_MS
     }
 
     /// Gives the image its colours. False when time was up before, which is never if it is to be done `at_once`.
@@ -357,7 +315,7 @@ impl Picture {
         let Some(view) = self.view.filter(|_| self.pass == Pass::Colouring) else {
             return self.pass > Pass::Colouring;
         };
-        let load = studio.colouring(&view, self.curves.load);
+        let (kind, load) = studio.colouring_load(&view, &self.composition);
         let since = allowance.elapsed_ms();
         // On a backend that cannot repaint, refinement comes first.
         let is_done = if self.refines_first(studio.method) {
@@ -382,7 +340,7 @@ impl Picture {
         if !is_done {
             return false;
         }
-        studio.predicted.resolve += self.learn(studio.costs, Kind::Resolve, load);
+        studio.predicted.resolve += self.learn(studio.costs, kind, load);
         self.motion.has_its_light = true;
         self.enter(Pass::Coloured);
         true
@@ -475,7 +433,7 @@ impl Picture {
         let predicted = costs.predict_ms(kind, load);
         let is_whole = match kind {
             Kind::Raster => self.base.is_whole(),
-            Kind::Resolve => self.base.is_whole() || !self.motion.has_its_light,
+            Kind::Resolve | Kind::Light => self.base.is_whole() || !self.motion.has_its_light,
             _ => true,
         };
         if is_whole {

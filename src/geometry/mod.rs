@@ -12,6 +12,7 @@ pub mod quadratic;
 pub mod screen;
 pub mod shapes;
 pub mod topology;
+mod triangle_set;
 pub mod viewport;
 
 pub use bary::Bary;
@@ -20,6 +21,7 @@ pub use curved::CurvedTriangles;
 pub use mesh::{Mesh, MeshError};
 pub use quadratic::Quadratic;
 pub use topology::Topology;
+pub use triangle_set::TriangleSet;
 
 /// Many three-component vectors, one array per component, ready for SIMD lanes.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -164,6 +164,26 @@ impl<'a> Allowance<'a> {
         4 * self.done.images.min(7)
     }
 
+    /// How many triangles of the first image in hand are to be lit in a replayed frame; see [`FrameRecord::lit`].
+    #[must_use]
+    pub fn replayed_lit(&self) -> Option<u32> {
+        match self.budget {
+            Budget::Replay(record) => Some(record.lit[self.place_of_lit()]),
+            _ => None,
+        }
+    }
+
+    /// Notes how many triangles of the first image in hand have been lit.
+    pub fn note_lit(&mut self, triangles: u32) {
+        let place = self.place_of_lit();
+        self.done.lit[place] = self.done.lit[place].max(triangles);
+    }
+
+    /// Where the record has that of the image in hand.
+    fn place_of_lit(&self) -> usize {
+        usize::from(self.done.images > 0)
+    }
+
     /// Whether there is room for `units` of work that, with what has to come after it, will take `ms` milliseconds. Unlike
     /// [`admit`](Self::admit) it may be asked again, for less.
     #[must_use]
@@ -176,6 +196,16 @@ impl<'a> Allowance<'a> {
             Budget::Work(total) => self.spent_units.saturating_add(units) <= total,
             Budget::Replay(_) => false,
             Budget::Millis(budget_ms) => self.elapsed_ms() + ms <= budget_ms,
+        }
+    }
+
+    /// When the frame has to end, in milliseconds since its start; `None` under any other budget than one of wall-clock time, and when it
+    /// has been cancelled.
+    #[must_use]
+    pub fn deadline_ms(&self) -> Option<f64> {
+        match self.budget {
+            Budget::Millis(ms) if !self.is_over && !self.is_cancelled() => Some(ms),
+            _ => None,
         }
     }
 

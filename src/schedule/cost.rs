@@ -77,6 +77,11 @@ pub const CURVE_NODE_NS: f32 = 6.0;
 pub const CURVED_PIXEL_NS: f32 = 0.3;
 /// The same of one with several parts.
 pub const PARTED_PIXEL_NS: f32 = 1.0;
+/// What a pixel takes beyond one that is interpolated if it is shaded while it gets its first colour: a fixed part, and one for each
+/// light.
+pub const LIT_PIXEL_NS: f32 = 1.2;
+/// See [`LIT_PIXEL_NS`].
+pub const LIT_PIXEL_LIGHT_NS: f32 = 0.4;
 /// Enlarging an image: a part for each pixel written.
 pub const ENLARGE_PIXEL_NS: f32 = 0.6;
 
@@ -135,6 +140,12 @@ pub fn curved_pixel(n: u32) -> f32 {
         1 => CURVED_PIXEL_NS,
         _ => PARTED_PIXEL_NS,
     }
+}
+
+/// What a pixel under `lights` lights takes beyond one that is interpolated, if it is shaded while it gets its first colour.
+#[must_use]
+pub fn lit_pixel(lights: usize) -> f32 {
+    LIT_PIXEL_NS + LIT_PIXEL_LIGHT_NS * lights as f32
 }
 
 /// Drawing `triangles` triangles of `pixels` pixels altogether on a backend that cannot repaint.

@@ -52,6 +52,11 @@ pub enum Kind {
     Shade,
     /// Colouring the first image.
     Resolve,
+    /// The same where some pixels are shaded by the illumination equation: what that takes beyond interpolation is the pixels' part, all
+    /// the rest the items'.
+    Light,
+    /// Illuminating nodes of triangles that will have curved colours.
+    Curve,
     /// Collecting what could be refined.
     Collect,
     /// Planning refinement.
@@ -66,11 +71,13 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Cull,
         Self::Raster,
         Self::Shade,
         Self::Resolve,
+        Self::Light,
+        Self::Curve,
         Self::Collect,
         Self::Plan,
         Self::Paint,
@@ -86,6 +93,8 @@ impl Kind {
             Self::Raster => "raster",
             Self::Shade => "shade",
             Self::Resolve => "resolve",
+            Self::Light => "light",
+            Self::Curve => "curve",
             Self::Collect => "collect",
             Self::Plan => "plan",
             Self::Paint => "paint",
@@ -159,6 +168,14 @@ impl Rate {
         self.predict_ms(load) * (1.0 + CAUTION * self.spread)
     }
 
+    /// The rate of something that takes as long as pixels do.
+    fn as_of_pixels(&self) -> Self {
+        Self {
+            items: self.pixels,
+            ..*self
+        }
+    }
+
     /// Whether both parts are positive numbers of a sensible size, which those of a file need not be.
     #[must_use]
     pub fn is_valid(&self) -> bool {
@@ -219,6 +236,10 @@ pub struct CostModel {
     raster: Rate,
     shade: Rate,
     resolve: Rate,
+    #[serde(default)]
+    light: Rate,
+    #[serde(default)]
+    curve: Rate,
     collect: Rate,
     plan: Rate,
     paint: Rate,
@@ -230,13 +251,13 @@ impl CostModel {
     /// Milliseconds that the work will probably take.
     #[must_use]
     pub fn predict_ms(&self, kind: Kind, load: Load) -> f64 {
-        self.rate(kind).predict_ms(load)
+        self.best_guess(kind).predict_ms(load)
     }
 
     /// Milliseconds that it will probably not exceed.
     #[must_use]
     pub fn predict_at_most_ms(&self, kind: Kind, load: Load) -> f64 {
-        self.rate(kind).predict_at_most_ms(load)
+        self.best_guess(kind).predict_at_most_ms(load)
     }
 
     /// Takes note that the work took `ms` milliseconds.
@@ -263,11 +284,23 @@ impl CostModel {
             Kind::Raster => &self.raster,
             Kind::Shade => &self.shade,
             Kind::Resolve => &self.resolve,
+            Kind::Light => &self.light,
+            Kind::Curve => &self.curve,
             Kind::Collect => &self.collect,
             Kind::Plan => &self.plan,
             Kind::Paint => &self.paint,
             Kind::Present => &self.present,
             Kind::Enlarge => &self.enlarge,
+        }
+    }
+
+    /// The rate of a kind of work, or of a similar one as long as it has not been measured.
+    fn best_guess(&self, kind: Kind) -> Rate {
+        let rate = *self.rate(kind);
+        match kind {
+            Kind::Light if rate.seen == 0 => self.resolve.as_of_pixels(),
+            Kind::Curve if rate.seen == 0 => self.plan,
+            _ => rate,
         }
     }
 
@@ -277,6 +310,8 @@ impl CostModel {
             Kind::Raster => &mut self.raster,
             Kind::Shade => &mut self.shade,
             Kind::Resolve => &mut self.resolve,
+            Kind::Light => &mut self.light,
+            Kind::Curve => &mut self.curve,
             Kind::Collect => &mut self.collect,
             Kind::Plan => &mut self.plan,
             Kind::Paint => &mut self.paint,

@@ -19,8 +19,17 @@ pub struct FrameRecord {
     /// of rounds of division in three of them, and whether the last round was taken back.
     #[serde(default)]
     pub divisions: u32,
+    /// How many triangles were shaded per pixel as they got their first colours, those first that looked worst, in the first image of
+    /// the frame and in those after it, of which at most one is lit; [`EVERYTHING`](Self::EVERYTHING) stands for the whole image.
+    #[serde(default)]
+    pub lit: [u32; 2],
     /// Steps of refinement that were admitted.
     pub steps: u64,
+}
+
+impl FrameRecord {
+    /// See [`lit`](Self::lit).
+    pub const EVERYTHING: u32 = u32::MAX;
 }
 
 impl Default for FrameRecord {
@@ -32,6 +41,7 @@ impl Default for FrameRecord {
             images: 0,
             is_image_begun: false,
             divisions: 0,
+            lit: [0; 2],
             steps: 0,
         }
     }

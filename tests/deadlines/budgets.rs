@@ -116,7 +116,7 @@ fn costs_can_be_saved_and_started_from() {
         serde_json::to_value(&from_json)
             .ok()
             .map(|v| v.as_object().map(|o| o.len())),
-        Some(Some(9))
+        Some(Some(11))
     );
     let scene = mixed();
     let engine = engine(

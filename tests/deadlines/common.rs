@@ -2,7 +2,7 @@
 
 use specula::clock::Clock;
 use specula::glam::DMat3;
-use specula::schedule::{CancelToken, CostModel, FrameRecord};
+use specula::schedule::{CancelToken, CostModel, FrameRecord, Kind, Load};
 use specula::{Budget, Engine, EngineOptions, Frame, FrameStats, Method, Scene};
 use std::fmt;
 use std::sync::Arc;
@@ -99,6 +99,23 @@ pub(crate) fn options(method: Method, threads: usize, clock: Arc<CountingClock>)
         clock,
         costs: Some(CostModel::default()),
         ..EngineOptions::default()
+    }
+}
+
+/// What work takes on a machine that seems to take so many times as long as nominal to light pixels of a first image.
+pub(crate) fn lighting_takes(times: f64) -> CostModel {
+    let mut costs = CostModel::default();
+    // What is measured first counts for all of it, the second half.
+    costs.learn(Kind::Light, Load::of_items(1e6), 1.0);
+    costs.learn(Kind::Light, Load::of_pixels(1e6), 2.0 * times - 1.0);
+    costs
+}
+
+/// Options of an engine that will therefore not light anything, but refine images.
+pub(crate) fn refining_options(threads: usize, clock: Arc<CountingClock>) -> EngineOptions {
+    EngineOptions {
+        costs: Some(lighting_takes(1e3)),
+        ..options(Method::Adaptive, threads, clock)
     }
 }
 

@@ -71,12 +71,13 @@ fn timed_frames_are_repeated_bit_for_bit_by_other_engines() {
         Method::PhongHalf,
         Method::Gouraud,
     ] {
-        for (us, budget_ms, cancels_at) in [
-            (100.0, 0.8, u64::MAX),
-            (20.0, 1.0, 300),
-            (2.0, 1.0, 2000),
-            (7.0, 0.5, 777),
-            (1.0, 9.0, u64::MAX),
+        for (us, budget_ms, cancels_at, lighting) in [
+            (100.0, 0.8, u64::MAX, 1.0),
+            (20.0, 1.0, 300, 1.0),
+            (2.0, 1.0, 2000, 1.0),
+            (7.0, 0.5, 777, 1.0),
+            (1.0, 9.0, u64::MAX, 1.0),
+            (1.0, 0.4, u64::MAX, 10.0),
         ] {
             let token = CancelToken::new();
             let clock = CountingClock::cancelling(us, cancels_at, token.clone());
@@ -85,6 +86,7 @@ fn timed_frames_are_repeated_bit_for_bit_by_other_engines() {
                 &scene,
                 EngineOptions {
                     cancel: token.clone(),
+                    costs: Some(lighting_takes(lighting)),
                     ..options(method, 1, clock)
                 },
             );
@@ -97,6 +99,12 @@ fn timed_frames_are_repeated_bit_for_bit_by_other_engines() {
                 }
             });
             seen.extend(recorded.iter().map(|frame| frame.outcome.name()));
+            let lit = recorded.iter().flat_map(|frame| frame.record.lit);
+            seen.extend(lit.map(|lit| match lit {
+                0 => "not lit",
+                FrameRecord::EVERYTHING => "lit as a whole",
+                _ => "lit in part",
+            }));
             let mut replayed_by = engine(
                 &scene,
                 EngineOptions {
@@ -122,7 +130,16 @@ fn timed_frames_are_repeated_bit_for_bit_by_other_engines() {
             }
         }
     }
-    for name in ["stale", "reduced", "refined", "complete", "unchanged"] {
+    for name in [
+        "stale",
+        "reduced",
+        "refined",
+        "complete",
+        "unchanged",
+        "not lit",
+        "lit in part",
+        "lit as a whole",
+    ] {
         assert!(
             seen.contains(name),
             "{name} is among what is repeated: {seen:?}"
@@ -213,7 +230,7 @@ fn timed_frames_of_a_backend_that_cannot_repaint_are_repeated_too() {
 fn a_replay_cannot_be_stopped() {
     let scene = mixed();
     let clock = CountingClock::stepping(1.0);
-    let mut recorded_by = engine(&scene, options(Method::Adaptive, 1, clock));
+    let mut recorded_by = engine(&scene, refining_options(1, clock));
     let mut want = Frame::new(SIZE[0], SIZE[1]);
     let stats = recorded_by.render(&scene, Budget::Millis(1.0), &mut want);
     assert!(stats.record.steps > 0, "{stats:?}");
@@ -244,6 +261,7 @@ fn records_of_something_else_do_no_harm() {
                     images,
                     is_image_begun,
                     divisions: images.wrapping_mul(0x9e37),
+                    lit: [images.wrapping_mul(0x51), divisor],
                     steps,
                 };
                 let scene = turned(&scene, steps % 7);

@@ -114,18 +114,25 @@ fn an_image_of_another_view_is_not_final() {
 #[test]
 fn a_cancelled_engine_returns_soon_keeps_its_image_and_goes_on_later() {
     let scene = mixed();
-    for (method, threads) in [
-        (Method::Adaptive, 1),
-        (Method::Adaptive, 2),
-        (Method::Phong, 1),
+    // Enough for everything, but not to light pixels where that seems to take long.
+    let budget = Budget::Millis(20.0);
+    for (method, threads, refines) in [
+        (Method::Adaptive, 1, true),
+        (Method::Adaptive, 2, true),
+        (Method::Adaptive, 1, false),
+        (Method::Phong, 1, false),
     ] {
+        let options = |clock| match refines {
+            true => refining_options(threads, clock),
+            false => options(method, threads, clock),
+        };
         let want = converged(&scene, method);
         let (mut stopped, mut refining) = (0, 0);
         // Readings of a frame that nobody stops.
         let clock = CountingClock::stepping(1.0);
-        let mut undisturbed = engine(&scene, options(method, threads, clock.clone()));
+        let mut undisturbed = engine(&scene, options(clock.clone()));
         let mut frame = Frame::new(SIZE[0], SIZE[1]);
-        undisturbed.render(&scene, Budget::Millis(1e6), &mut frame);
+        undisturbed.render(&scene, budget, &mut frame);
         let readings = clock.readings();
         for at in (1..readings).step_by((readings / 80).max(1) as usize) {
             let token = CancelToken::new();
@@ -134,11 +141,11 @@ fn a_cancelled_engine_returns_soon_keeps_its_image_and_goes_on_later() {
                 &scene,
                 EngineOptions {
                     cancel: token.clone(),
-                    ..options(method, threads, clock.clone())
+                    ..options(clock.clone())
                 },
             );
             let mut frame = Frame::new(SIZE[0], SIZE[1]);
-            let stats = engine.render(&scene, Budget::Millis(1e6), &mut frame);
+            let stats = engine.render(&scene, budget, &mut frame);
             let what = format!("{method}, {threads} threads, reading {at}: {stats:?}");
             if token.is_cancelled() && !stats.converged {
                 stopped += 1;
@@ -153,7 +160,7 @@ fn a_cancelled_engine_returns_soon_keeps_its_image_and_goes_on_later() {
             // While it is cancelled nothing changes.
             let pixels = frame.pixels().to_vec();
             token.cancel();
-            let again = engine.render(&scene, Budget::Millis(1e6), &mut frame);
+            let again = engine.render(&scene, budget, &mut frame);
             assert_eq!((again.work_units, again.record.images), (0, 0), "{what}");
             assert!(frame.pixels() == pixels, "{what}");
             assert!(
@@ -161,10 +168,10 @@ fn a_cancelled_engine_returns_soon_keeps_its_image_and_goes_on_later() {
                 "{what}"
             );
             token.reset();
-            finish(&mut engine, &scene, Budget::Millis(1e6), &mut frame);
+            finish(&mut engine, &scene, budget, &mut frame);
             assert!(frame.pixels() == want, "{what}");
         }
-        let least = if method == Method::Adaptive { 3 } else { 0 };
+        let least = if refines { 3 } else { 0 };
         assert!(
             stopped > 5 && refining >= least,
             "{method}: {stopped} frames were stopped, {refining} of them while refining"

@@ -78,7 +78,7 @@ pub(super) fn collect(
             }
         }
         // Never asked for: they are not among the capabilities.
-        BasePaint::Phong | BasePaint::Curved { .. } => {}
+        BasePaint::Phong | BasePaint::Mixed { .. } => {}
     }
 }
 

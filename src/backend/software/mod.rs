@@ -39,6 +39,7 @@ mod setup;
 mod shares;
 mod squares;
 mod stages;
+mod surface;
 mod tile;
 mod transform;
 mod triangles;
@@ -51,6 +52,7 @@ use super::{
 };
 use crate::output::{Rect, Stamp, Target};
 use crate::parallel::{Exec, Turn, Watch};
+use crate::simd::dispatch;
 use drawing::{Drawing, Spare};
 use moved::{Origin, PaintKind};
 use repaint::Job;
@@ -315,6 +317,24 @@ impl Backend for SoftwareBackend {
         }
         let known = target.serial_by(self.writer);
         present::stale_tiles(&self.tiles, known)
+            .map(Tile::pixels)
+            .sum()
+    }
+
+    fn pending_after_resolve(
+        &self,
+        exec: Exec,
+        geometry: Geometry<'_>,
+        target: &Target<'_>,
+    ) -> u64 {
+        let view = geometry.view;
+        let size = (target.width(), target.height());
+        if size != (view.width, view.height) || size != (self.grid.width, self.grid.height) {
+            return 0;
+        }
+        let background = dispatch!(exec.level, simd => resolve::background(simd, geometry));
+        let known = target.serial_by(self.writer);
+        present::after_resolve(&self.tiles, known, background)
             .map(Tile::pixels)
             .sum()
     }

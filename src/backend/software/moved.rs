@@ -43,7 +43,7 @@ impl Origin {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PaintKind {
     Gouraud,
-    Curved,
+    Mixed,
     Flat,
     Phong,
 }
@@ -53,7 +53,7 @@ impl PaintKind {
         match paint {
             // Parts are for backends that cannot repaint.
             BasePaint::Gouraud(_) | BasePaint::Refined { .. } => Self::Gouraud,
-            BasePaint::Curved { .. } => Self::Curved,
+            BasePaint::Mixed { .. } => Self::Mixed,
             BasePaint::Flat(_) => Self::Flat,
             BasePaint::Phong => Self::Phong,
         }
@@ -115,8 +115,8 @@ impl SoftwareBackend {
 
     /// Begins colours. Those that tiles have kept stay if they are of the same kind, and nothing is said to have become of them.
     pub(super) fn begin_colours(&mut self, kind: PaintKind, are_kept: bool) {
-        // How a triangle is curved depends on its pixels, and others may have moved in front.
-        let are_kept = are_kept && self.painted == Some(kind) && kind != PaintKind::Curved;
+        // What becomes of a triangle depends on its pixels, and others may have moved in front.
+        let are_kept = are_kept && self.painted == Some(kind) && kind != PaintKind::Mixed;
         self.painted = Some(kind);
         for next in &mut self.resolved {
             if !are_kept || usize::from(*next) < TILE_BLOCKS {

@@ -55,6 +55,21 @@ pub(super) fn stale_tiles(tiles: &[Tile], known: Option<u64>) -> impl Iterator<I
         .filter(move |tile| known.is_none_or(|serial| tile.serial > serial))
 }
 
+/// The tiles that such a target may lack once all have got new colours: those as well that show a triangle, have shown one, or will have
+/// another background.
+pub(super) fn after_resolve(
+    tiles: &[Tile],
+    known: Option<u64>,
+    background: u32,
+) -> impl Iterator<Item = &Tile> {
+    let stays = move |tile: &Tile| {
+        tile.owned.is_empty() && tile.painted.is_empty() && tile.background == Some(background)
+    };
+    tiles
+        .iter()
+        .filter(move |tile| known.is_none_or(|serial| tile.serial > serial) || !stays(tile))
+}
+
 /// Appends the rectangles that such a target lacks: neighbours in a row of tiles are one, and so are equal ones in rows that
 /// follow each other.
 pub(super) fn changes(grid: Grid, tiles: &[Tile], known: Option<u64>, out: &mut Vec<Rect>) {

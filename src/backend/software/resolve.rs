@@ -3,23 +3,17 @@
 //! Only blocks in which some pixel has an owner are looked at; one that has lost all of them gets the background, and one that
 //! had none before either is left alone.
 //!
-//! A vector of pixels belongs to one triangle or to a few. The triangles in it are taken one after the other,
-//! each fills its lanes of the linear colour (or, for per-pixel illumination, of the position and normal, which are then
-//! illuminated together, once for each material), and the vector is encoded once. What a lane gets does not depend on its
-//! neighbours.
+//! Each vector of pixels gets its linear colours from a [`Surface`], and is encoded once.
 
-use super::lanes::{
-    Corners3, Lanes3, PartHint, curved_colours, gather, interpolate, select3, splat3, weights_at,
-};
+use super::lanes::splat3;
 use super::setup::Drawn;
 use super::shares::Shares;
+use super::surface::{Flat, Gouraud, Mixed, Owners, Phong, Surface};
 use super::tile::{
     BLOCK_PIXELS, BLOCK_SIDE, BlockSet, NO_TRIANGLE, TILE_BLOCKS, Tile, block_corner,
 };
 use crate::backend::{BasePaint, Geometry};
-use crate::geometry::curved::PartColours;
-use crate::geometry::{CurvedTriangles, Vec3s};
-use crate::illumination::{ActiveLights, ShadingKit, shade_lanes};
+use crate::illumination::ShadingKit;
 use crate::output::encode::encode_lanes;
 use crate::parallel::{Pace, Watch};
 use crate::scene::World;
@@ -38,7 +32,7 @@ pub(super) struct Painter<'a> {
 }
 
 impl<'a> Painter<'a> {
-    fn world(&self) -> &'a World {
+    pub(super) fn world(&self) -> &'a World {
         self.geometry.world
     }
 
@@ -62,8 +56,14 @@ impl<'a> Painter<'a> {
 /// Blocks that are painted in one go: with interpolated colours about 10 microseconds on a fine mesh.
 const BLOCKS_AT_ONCE: usize = 64;
 
-/// The same with the illumination equation at every pixel, times lights.
-const LIT_BLOCKS_AT_ONCE: usize = 96;
+/// Under so many lights a pixel that the illumination equation is evaluated at takes twice as long as without any.
+const LIGHTS_PER_PIXEL: usize = 5;
+
+/// Blocks that are painted in one go where the illumination equation is evaluated.
+fn lit_blocks_at_once(painter: &Painter<'_>) -> usize {
+    let lights = painter.world().lights.len();
+    (BLOCKS_AT_ONCE * LIGHTS_PER_PIXEL / (LIGHTS_PER_PIXEL + lights)).max(1)
+}
 
 /// Paints a tile, or goes on with it, until it is told to stop. `next` is the block to go on with: 0 at first, [`TILE_BLOCKS`]
 /// when the tile is complete.
@@ -78,9 +78,7 @@ pub(super) fn resolve_tile<S: Simd>(
     watch: &Watch<'_>,
 ) {
     if *next == 0 {
-        let encoding = painter.geometry.view.encoding;
-        let background = encode_lanes(simd, encoding, splat3(simd, painter.world().background));
-        fill_background(tile, background[0], painter.serial);
+        fill_background(tile, background(simd, painter.geometry), painter.serial);
         if !tile.owned.is_empty() {
             painter.shares.prefetch(index);
         }
@@ -93,27 +91,23 @@ pub(super) fn resolve_tile<S: Simd>(
     let end = match paint {
         // Parts are for backends that cannot repaint.
         BasePaint::Gouraud(colours) | BasePaint::Refined { colours, .. } => {
-            let mut gouraud = Gouraud {
-                painter,
-                colours,
-                last: NO_TRIANGLE,
-                corners: Corners3::default(),
-            };
+            let mut gouraud = Gouraud::new(painter, colours);
             let pace = Pace::new(watch, BLOCKS_AT_ONCE);
             paint_tile(simd, tile, painter, &mut gouraud, left, pace)
         }
-        BasePaint::Curved { colours, curved } => {
-            let mut surface = Curved {
-                painter,
-                colours,
-                curved,
-                last: NO_TRIANGLE,
-                corners: Corners3::default(),
-                parts: None,
-                hint: PartHint::FIRST,
+        BasePaint::Mixed {
+            colours,
+            curved,
+            lit,
+        } => {
+            let mut mixed = Mixed::new(painter, colours, curved, lit);
+            let some = if lit.is_empty() {
+                BLOCKS_AT_ONCE
+            } else {
+                lit_blocks_at_once(painter)
             };
-            let pace = Pace::new(watch, BLOCKS_AT_ONCE);
-            paint_tile(simd, tile, painter, &mut surface, left, pace)
+            let pace = Pace::new(watch, some);
+            paint_tile(simd, tile, painter, &mut mixed, left, pace)
         }
         BasePaint::Flat(colours) => {
             let pace = Pace::new(watch, BLOCKS_AT_ONCE);
@@ -127,24 +121,18 @@ pub(super) fn resolve_tile<S: Simd>(
             )
         }
         BasePaint::Phong => {
-            let lights = painter.world().lights.len();
-            let mut phong = Phong {
-                painter,
-                active: ActiveLights::all(lights),
-                kit: None,
-            };
-            let some = BLOCKS_AT_ONCE.min(LIT_BLOCKS_AT_ONCE / (1 + lights));
-            paint_tile(
-                simd,
-                tile,
-                painter,
-                &mut phong,
-                left,
-                Pace::new(watch, some),
-            )
+            let pace = Pace::new(watch, lit_blocks_at_once(painter));
+            paint_tile(simd, tile, painter, &mut Phong::new(painter), left, pace)
         }
     };
     *next = end as u16;
+}
+
+/// The background's colour as it is stored.
+#[inline(always)]
+pub(super) fn background<S: Simd>(simd: S, geometry: Geometry<'_>) -> u32 {
+    let linear = splat3(simd, geometry.world.background);
+    encode_lanes(simd, geometry.view.encoding, linear)[0]
 }
 
 /// Gives blocks that no triangle has a pixel of the background's colour, unless they have it already.
@@ -161,46 +149,6 @@ fn fill_background(tile: &mut Tile, background: u32, serial: u64) {
         }
     }
     tile.painted = tile.owned;
-}
-
-/// The triangles in a vector of pixels.
-#[derive(Clone, Copy)]
-struct Owners<'a, S: Simd> {
-    slots: S::u32s,
-    /// The same in memory.
-    slice: &'a [u32],
-    /// Columns and rows of the pixels in the image.
-    column: S::f32s,
-    row: S::f32s,
-}
-
-impl<S: Simd> Owners<'_, S> {
-    /// The slot of the owner of the first pixel in a bit set, and all pixels that it owns.
-    #[inline(always)]
-    fn first(&self, pixels: u64) -> (u32, S::mask32s) {
-        let slot = self.slice[pixels.trailing_zeros() as usize];
-        (slot, self.slots.simd_eq(slot))
-    }
-
-    /// Weights of a triangle's corners at the pixels.
-    #[inline(always)]
-    fn weights(&self, simd: S, drawn: &Drawn) -> Lanes3<S> {
-        let planes = drawn.interpolator();
-        let [x, y] = planes.anchor.map(|v| v as f32);
-        weights_at(simd, &planes, self.column - x, self.row - y)
-    }
-}
-
-/// How the pixels of one vector get their linear colours.
-trait Surface {
-    /// Puts the colours of the pixels in the bit set `covered` over `background`.
-    fn colours<S: Simd>(
-        &mut self,
-        simd: S,
-        owners: Owners<'_, S>,
-        covered: u64,
-        background: Lanes3<S>,
-    ) -> Lanes3<S>;
 }
 
 /// Paints some blocks of a tile until it is told to stop. Returns the block to go on with, or [`TILE_BLOCKS`].
@@ -251,171 +199,4 @@ fn paint_tile<S: Simd>(
         tile.serial = painter.serial;
     }
     next
-}
-
-/// Vertex colours, interpolated.
-struct Gouraud<'a> {
-    painter: &'a Painter<'a>,
-    colours: &'a Vec3s,
-    /// The slot painted last: as a rule the next vector begins with it.
-    last: u32,
-    /// Its corners' colours.
-    corners: Corners3,
-}
-
-impl Surface for Gouraud<'_> {
-    #[inline(always)]
-    fn colours<S: Simd>(
-        &mut self,
-        simd: S,
-        owners: Owners<'_, S>,
-        covered: u64,
-        background: Lanes3<S>,
-    ) -> Lanes3<S> {
-        let (mut left, mut out) = (covered, background);
-        while left != 0 {
-            let (slot, mask) = owners.first(left);
-            let drawn = self.painter.shares.drawn(slot);
-            let w = owners.weights(simd, drawn);
-            if slot != self.last {
-                self.corners = gather(self.colours, drawn.vertices);
-                self.last = slot;
-            }
-            let colour = interpolate(simd, w, &self.corners);
-            out = select3::<S>(mask, colour, out);
-            left &= !mask.to_bitmask();
-        }
-        out
-    }
-}
-
-/// Vertex colours, interpolated, but for triangles that are curved.
-struct Curved<'a> {
-    painter: &'a Painter<'a>,
-    colours: &'a Vec3s,
-    curved: &'a CurvedTriangles,
-    /// The slot painted last, its corners' colours, and its parts.
-    last: u32,
-    corners: Corners3,
-    parts: Option<(u32, &'a [PartColours])>,
-    hint: PartHint,
-}
-
-impl Surface for Curved<'_> {
-    #[inline(always)]
-    fn colours<S: Simd>(
-        &mut self,
-        simd: S,
-        owners: Owners<'_, S>,
-        covered: u64,
-        background: Lanes3<S>,
-    ) -> Lanes3<S> {
-        let (mut left, mut out) = (covered, background);
-        while left != 0 {
-            let (slot, mask) = owners.first(left);
-            let drawn = self.painter.shares.drawn(slot);
-            let w = owners.weights(simd, drawn);
-            if slot != self.last {
-                self.parts = self.curved.get(drawn.id);
-                self.corners = gather(self.colours, drawn.vertices);
-                self.hint = PartHint::FIRST;
-                self.last = slot;
-            }
-            out = match self.parts {
-                Some((n, parts)) => curved_colours(simd, w, n, parts, &mut self.hint, mask, out),
-                None => select3::<S>(mask, interpolate(simd, w, &self.corners), out),
-            };
-            left &= !mask.to_bitmask();
-        }
-        out
-    }
-}
-
-/// One colour for each triangle.
-struct Flat<'a> {
-    painter: &'a Painter<'a>,
-    colours: &'a Vec3s,
-}
-
-impl Surface for Flat<'_> {
-    #[inline(always)]
-    fn colours<S: Simd>(
-        &mut self,
-        simd: S,
-        owners: Owners<'_, S>,
-        covered: u64,
-        background: Lanes3<S>,
-    ) -> Lanes3<S> {
-        let (mut left, mut out) = (covered, background);
-        while left != 0 {
-            let (slot, mask) = owners.first(left);
-            let drawn = self.painter.shares.drawn(slot);
-            let colour = splat3(simd, self.colours.get(drawn.id as usize));
-            out = select3::<S>(mask, colour, out);
-            left &= !mask.to_bitmask();
-        }
-        out
-    }
-}
-
-/// The illumination equation at every pixel.
-struct Phong<'a> {
-    painter: &'a Painter<'a>,
-    active: ActiveLights,
-    /// The material illuminated last: neighbours share it as a rule.
-    kit: Option<(u16, ShadingKit<'a>)>,
-}
-
-impl<'a> Phong<'a> {
-    #[inline(always)]
-    fn kit(&mut self, material: u16) -> ShadingKit<'a> {
-        match self.kit {
-            Some((known, kit)) if known == material => kit,
-            _ => {
-                let kit = self.painter.kit(material);
-                self.kit = Some((material, kit));
-                kit
-            }
-        }
-    }
-}
-
-impl Surface for Phong<'_> {
-    #[inline(always)]
-    fn colours<S: Simd>(
-        &mut self,
-        simd: S,
-        owners: Owners<'_, S>,
-        covered: u64,
-        background: Lanes3<S>,
-    ) -> Lanes3<S> {
-        let world = self.painter.world();
-        let (mut left, mut out) = (covered, background);
-        while left != 0 {
-            // All pixels with the material of the first.
-            let first = self.painter.shares.drawn(owners.first(left).0);
-            let material = self.painter.material(first);
-            let mut alike = S::mask32s::splat(simd, false);
-            let (mut point, mut normal) = (background, background);
-            let mut unseen = left;
-            while unseen != 0 {
-                let (slot, mask) = owners.first(unseen);
-                let drawn = self.painter.shares.drawn(slot);
-                if self.painter.material(drawn) == material {
-                    let w = owners.weights(simd, drawn);
-                    let p = interpolate(simd, w, &gather(&world.positions, drawn.vertices));
-                    let n = interpolate(simd, w, &gather(&world.normals, drawn.vertices));
-                    point = select3::<S>(mask, p, point);
-                    normal = select3::<S>(mask, n, normal);
-                    alike |= mask;
-                }
-                unseen &= !mask.to_bitmask();
-            }
-            let kit = self.kit(material);
-            let colour = shade_lanes(simd, &kit, &self.active, point, normal);
-            out = select3::<S>(alike, colour, out);
-            left &= !alike.to_bitmask();
-        }
-        out
-    }
 }

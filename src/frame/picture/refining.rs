@@ -123,6 +123,10 @@ impl Picture {
             self.refinement.clear();
             return self.draw_baseline(studio, allowance, &view);
         }
+        // It may have begun when the image was composed.
+        if std::mem::take(&mut self.is_planned) {
+            return self.refinement.note_image();
+        }
         let since = allowance.elapsed_ms();
         if studio.method == Method::PhongTiles {
             self.tiles.begin(&view, &*self.backend);
@@ -135,6 +139,7 @@ impl Picture {
         } else {
             self.refinement.clear();
         }
+        self.refinement.note_image();
         studio.stages.classify += allowance.elapsed_ms() - since;
     }
 

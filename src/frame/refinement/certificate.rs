@@ -38,6 +38,13 @@ impl Certificate {
         self.pixels[usize::from(to)] += u64::from(pixels);
     }
 
+    /// Notes that the bound of all pixels has fallen to so much.
+    pub(super) fn lower_all(&mut self, to: u8) {
+        let pixels = self.pixels.iter().sum();
+        self.pixels = [0; 256];
+        self.pixels[usize::from(to)] = pixels;
+    }
+
     /// The greatest bound of any pixel, in codes; 0 if there is none.
     pub(super) fn most(&self) -> u8 {
         let most = self.pixels.iter().rposition(|&pixels| pixels > 0);

@@ -307,7 +307,7 @@ impl Refinement {
 
     /// Makes the next visible triangles roots of which only ids and pixels are known, block by block until collecting them will take
     /// so many nominal nanoseconds, or somewhat more. Returns how many.
-    fn take_up(&mut self, stage: &Stage<'_>, limit: f32) -> f32 {
+    pub(super) fn take_up(&mut self, stage: &Stage<'_>, limit: f32) -> f32 {
         let lights = stage.world.lights.len();
         let (each, sample) = (cost::collecting(1.0, lights), cost::samples(1, lights));
         let visible = stage.backend.visible_triangles();
@@ -329,7 +329,7 @@ impl Refinement {
     }
 
     /// Collects the roots from `first` on.
-    fn collect_from(&mut self, stage: &Stage<'_>, first: usize) {
+    pub(super) fn collect_from(&mut self, stage: &Stage<'_>, first: usize) {
         let roots = &mut self.roots[first..];
         let ranks = self.ranked_roots.extend(roots.len());
         // A still view may go on with more threads.

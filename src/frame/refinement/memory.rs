@@ -32,6 +32,8 @@ pub(super) struct Memory {
     found: Vec<Found>,
     /// Number of the current image.
     image: u32,
+    /// Whether that is not complete yet.
+    is_open: bool,
 }
 
 impl Memory {
@@ -39,16 +41,24 @@ impl Memory {
     pub(super) fn forget(&mut self) {
         self.known.fill(0);
         self.image = 0;
+        self.is_open = false;
     }
 
-    /// Begins with the next image of a world of `triangles` triangles: the same as before, unless all has been forgotten.
+    /// Begins with the next image of a world of `triangles` triangles: the same as before, unless all has been forgotten. One that is given up
+    /// before it is [complete](Self::note_image) does not count.
     pub(super) fn next_image(&mut self, triangles: usize) {
         if self.found.len() != triangles || self.image == u32::MAX {
             self.forget();
             self.known.resize(triangles.div_ceil(WORD), 0);
             self.found.resize(triangles, Found::default());
         }
-        self.image += 1;
+        self.image += u32::from(!self.is_open);
+        self.is_open = true;
+    }
+
+    /// Notes that the image is complete.
+    pub(super) fn note_image(&mut self) {
+        self.is_open = false;
     }
 
     /// Notes what was found about a triangle in the current image.
@@ -87,11 +97,14 @@ mod tests {
         memory.note(99, 0.0);
         memory.note(100, 1.0);
         for _ in 0..MOST_AGE {
+            memory.note_image();
+            memory.next_image(100);
             memory.next_image(100);
             let known: Vec<u32> = (0..200).filter(|&t| memory.recall(t).is_some()).collect();
             assert_eq!(known, [7, 99]);
             assert_eq!(memory.recall(7), Some(2.5));
         }
+        memory.note_image();
         memory.next_image(100);
         assert_eq!((memory.recall(7), memory.recall(99)), (None, None));
         memory.note(7, 0.5);

@@ -20,6 +20,7 @@ mod certificate;
 mod collecting;
 mod drawn_once;
 mod leaves;
+mod lighting;
 mod memory;
 mod painting;
 mod parts;
@@ -43,6 +44,7 @@ use collecting::Collector;
 pub(super) use drawn_once::DrawnLeaves;
 pub(super) use leaves::for_each_leaf;
 pub use leaves::{Leaf, LeafKind};
+pub(super) use lighting::{LitTriangles, MostLit};
 use memory::Memory;
 use parts::Part;
 use places::Places;
@@ -65,6 +67,9 @@ const NONE: u32 = u32::MAX;
 
 /// In place of one for roots that are right as they are.
 const PROVED: u32 = u32::MAX - 1;
+
+/// And for roots that were shaded as they got their first colours.
+const LIT: u32 = u32::MAX - 2;
 
 /// How much more error an image has than the sum of its estimates says, halfway: what looks worst is refined first, so what is
 /// left was underestimated as a rule. Fitted to the example scenes, like the guesses in [`ranking`].
@@ -99,7 +104,8 @@ struct Root {
     pixels: u32,
     /// Mean squared error, guessed or remembered, before anything was looked at.
     prior: f32,
-    /// Where in [`Refinement::shadings`] it is said how its pixels are shaded, once that has been asked; or [`NONE`], or [`PROVED`].
+    /// Where in [`Refinement::shadings`] it is said how its pixels are shaded, once that has been asked; or [`NONE`], [`PROVED`] or
+    /// [`LIT`].
     shading: u32,
     is_pht: bool,
     /// Divided before the first image was drawn.
@@ -198,6 +204,10 @@ pub(super) struct Refinement {
     /// Whether what is remembered takes the place of guesses.
     remembers: bool,
     shadings: Vec<RootShading>,
+    /// How roots are shaded that are [`LIT`].
+    lit_shading: RootShading,
+    /// Workspace: roots by their error.
+    by_error: RankedList,
     runs: Runs,
     certificate: Certificate,
     collectors: Vec<Collector>,
@@ -316,6 +326,11 @@ impl Refinement {
             && self.paints.is_empty()
     }
 
+    /// Notes that the first image is complete.
+    pub(super) fn note_image(&mut self) {
+        self.memory.note_image();
+    }
+
     /// Begins with a new image, of which nothing is known yet: its visible triangles are still to be
     /// [collected](collecting).
     pub(super) fn begin(
@@ -341,6 +356,7 @@ impl Refinement {
         self.roots.reserve(visible.len());
         self.make_collectors(exec, world);
         self.ranked_roots.reserve(visible.len());
+        self.by_error.reserve(visible.len());
         let capabilities = backend.capabilities();
         self.is_drawn_once = !capabilities.refines_in_place();
         if self.is_drawn_once {
@@ -428,6 +444,7 @@ impl Refinement {
     fn root_shading(&self, root: &Root) -> Option<&RootShading> {
         match root.shading {
             PROVED => Some(&shading::RIGHT_AS_IT_IS),
+            LIT => Some(&self.lit_shading),
             place => self.shadings.get(place as usize),
         }
     }

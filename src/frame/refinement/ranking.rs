@@ -31,7 +31,7 @@ const SPLIT_YIELD: f32 = 0.5;
 const CURIOSITY: f32 = 4.0;
 
 /// Mean squared error, in squared codes, up to which a triangle is looked at before it is shaded.
-const LOOK_ERROR: f32 = 0.25;
+pub(super) const LOOK_ERROR: f32 = 0.25;
 
 /// It is looked at so much sooner than it would be shaded: that costs a fraction, and may be all there is to do.
 const LOOK_FIRST: f32 = 8.0;

@@ -96,6 +96,22 @@ pub(super) struct RootShading {
     pub(super) shade: Shade,
 }
 
+impl Default for RootShading {
+    fn default() -> Self {
+        RIGHT_AS_IT_IS
+    }
+}
+
+impl RootShading {
+    /// Of a root that was shaded, all terms of so many lights, as it got its first colours.
+    pub(super) fn lit(lights: usize) -> Self {
+        Self {
+            shading: Shading::PerPixel(PixelShading::all(lights)),
+            ..RIGHT_AS_IT_IS
+        }
+    }
+}
+
 /// Of all roots that are right as they are.
 pub(super) const RIGHT_AS_IT_IS: RootShading = RootShading {
     shading: Shading::Proved,

@@ -1,7 +1,7 @@
 //! First images in the frame loop: which one is drawn next, at which resolution, and drawing it while there is time.
 
 use super::{Renderer, Work};
-use crate::frame::load::{self, MARGIN_MS};
+use crate::frame::load::MARGIN_MS;
 use crate::frame::picture::{Pass, Picture, Studio};
 use crate::frame::shelf::Size;
 use crate::output::Target;
@@ -145,7 +145,6 @@ impl Renderer {
         self.shelf.begin(size, view, divisor, frame);
         self.reserve_handing_over(target, work);
 
-        let handing_over_ms = self.handing_over_ms(divisor, target);
         let is_shown = self.shelf.shown_size() == Some(size);
         let Work {
             exec,
@@ -169,13 +168,21 @@ impl Renderer {
         if !picture.prepare(&mut studio, allowance) || !allowance.completes_image() {
             return false;
         }
-        picture.curve(&mut studio, allowance, handing_over_ms);
-        let curves = picture.curves();
+        let handing_over_ms = picture.handing_over_ms(&studio, target);
+        picture.compose(&mut studio, allowance, handing_over_ms, is_asked_for);
         if is_shown {
-            let ending_ms = studio.colouring_ms(&view, curves.load) + handing_over_ms;
-            let slowness = studio.stages.slowness(studio.predicted);
-            let has_time = allowance.has_time_for(ending_ms * slowness);
-            if !(is_colouring_due || has_time) || !picture.colour(&mut studio, allowance, true) {
+            let has_time = |picture: &Picture, studio: &Studio<'_>| {
+                let colouring_ms = studio.colouring_ms(&view, &picture.composition());
+                let slowness = studio.stages.slowness(studio.predicted);
+                allowance.has_time_for((colouring_ms + handing_over_ms) * slowness)
+            };
+            // Rather a plain image than none.
+            if !(is_colouring_due || has_time(picture, &studio) || picture.composition().is_plain())
+            {
+                picture.decompose(studio.world);
+            }
+            let may_begin = is_colouring_due || has_time(picture, &studio);
+            if !may_begin || !picture.colour(&mut studio, allowance, true) {
                 return false;
             }
         } else {
@@ -186,19 +193,11 @@ impl Renderer {
                 return false;
             }
         }
-        curves.book(allowance);
+        (picture.composition()).book(allowance, studio.world.lights.len());
         picture.begin_refinement(&mut studio, allowance);
         self.shelf.publish(size);
         allowance.note_image();
         true
-    }
-
-    /// Milliseconds that handing the whole of an image over will probably not exceed.
-    fn handing_over_ms(&self, divisor: u32, target: Option<&Target<'_>>) -> f64 {
-        target.map_or(0.0, |target| {
-            let size = [target.width(), target.height()];
-            load::handing_over_ms(&self.costs, size, divisor) + MARGIN_MS
-        })
     }
 
     /// Keeps what handing over the image shown will take.

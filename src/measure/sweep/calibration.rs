@@ -1,6 +1,6 @@
 //! The times that budgets are scaled by, and whether the machine was quiet enough to believe them.
 
-use super::{SweepBudget, SweepOptions};
+use super::{LEAD_FRAMES, SweepBudget, SweepOptions};
 use crate::frame::{Engine, EngineError, Method};
 use crate::output::Frame;
 use crate::scene::Scene;
@@ -107,14 +107,18 @@ impl Calibrator {
         self.engines[0].render(scene, Budget::Unlimited, frame);
     }
 
-    /// Measures `rounds` frames of each. A first round, which touches memory and wakes threads, does not count.
+    /// Measures `rounds` frames of each, after some that do not count.
     pub(super) fn measure(&mut self, rounds: usize, scene: &Scene, frame: &mut Frame) {
-        for round in 0..=rounds {
+        for _ in 0..rounds {
             for (engine, times) in self.engines.iter_mut().zip(&mut self.times) {
-                engine.forget();
-                let stats = engine.render(scene, Budget::Unlimited, frame);
-                if round > 0 {
-                    times.push(stats.frame_ms);
+                for number in 0..=LEAD_FRAMES {
+                    engine.forget();
+                    // Every pixel is handed over anew.
+                    frame.pixels_mut();
+                    let stats = engine.render(scene, Budget::Unlimited, frame);
+                    if number == LEAD_FRAMES {
+                        times.push(stats.frame_ms);
+                    }
                 }
             }
         }

@@ -1,7 +1,8 @@
 //! Error against time: methods and budgets, every measurement from a cold engine.
 //!
 //! **Cold** means that the engine has been told to forget its image, while memory has been touched and the pool is
-//! awake: a frame under the same budget is rendered and thrown away just before.
+//! awake: some frames under the same budget are rendered and thrown away just before. (After one, frame times on a shared virtual machine were two
+//! thirds of their median apart; after [`LEAD_FRAMES`], a twentieth.)
 //!
 //! Budgets that mean something on any machine are written `G + f (P - G)`, with `G` and `P` the times of a Gouraud and a
 //! Phong frame in the same run: `f = 0` buys Gouraud shading, `f = 1` Phong shading everywhere. Both are
@@ -248,7 +249,7 @@ impl<'a> Sweep<'a> {
             self.set_threshold(method, 0, 1);
             let mut images: Vec<(SweepRow, Frame)> = (0..self.options.repeats.max(1))
                 .map(|_| {
-                    self.render(method, budget, Start::Cold);
+                    self.lead_in(method, budget);
                     let stats = self.render(method, budget, Start::Cold);
                     let row = self.row(method, budget, 1, &stats);
                     (row, self.frame.clone())
@@ -274,7 +275,7 @@ impl<'a> Sweep<'a> {
     fn measure(&mut self, method: usize, budget: SweepBudget) -> Vec<SweepRow> {
         let mut repeats: Vec<Vec<SweepRow>> = Vec::new();
         for _ in 0..self.options.repeats.max(1) {
-            self.render(method, budget, Start::Cold);
+            self.lead_in(method, budget);
             repeats.push(
                 (1..=self.options.frames.max(1))
                     .map(|number| {
@@ -306,6 +307,13 @@ impl<'a> Sweep<'a> {
         for _ in 0..WARM_UP_FRAMES {
             engine.forget();
             engine.render(self.scene, Budget::from_millis(0.0), &mut self.frame);
+        }
+    }
+
+    /// Renders the frames before one that is measured.
+    fn lead_in(&mut self, method: usize, budget: SweepBudget) {
+        for _ in 0..LEAD_FRAMES {
+            self.render(method, budget, Start::Cold);
         }
     }
 
@@ -342,6 +350,9 @@ impl<'a> Sweep<'a> {
 
 /// First images that each engine draws before the first measured row.
 const WARM_UP_FRAMES: usize = 20;
+
+/// Frames before each that is measured: by then its engine's threads have the processors, and its memory the caches.
+const LEAD_FRAMES: usize = 5;
 
 /// How a frame starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
