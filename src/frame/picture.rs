@@ -315,7 +315,7 @@ impl Picture {
         let Some(view) = self.view.filter(|_| self.pass == Pass::Colouring) else {
             return self.pass > Pass::Colouring;
         };
-        let (kind, load) = studio.colouring_load(&view, &self.composition);
+        let loads = studio.colouring_loads(&view, &self.composition);
         let since = allowance.elapsed_ms();
         // On a backend that cannot repaint, refinement comes first.
         let is_done = if self.refines_first(studio.method) {
@@ -340,7 +340,11 @@ impl Picture {
         if !is_done {
             return false;
         }
-        studio.predicted.resolve += self.learn(studio.costs, kind, load);
+        let predicted = loads.map(|(kind, load)| studio.costs.predict_ms(kind, load));
+        studio.predicted.resolve += predicted.iter().sum::<f64>();
+        if self.base.is_whole() || !self.motion.has_its_light {
+            studio.costs.learn_both(loads, self.stage_ms);
+        }
         self.motion.has_its_light = true;
         self.enter(Pass::Coloured);
         true
@@ -431,12 +435,7 @@ impl Picture {
     /// learned from one of which parts were kept.
     fn learn(&self, costs: &mut CostModel, kind: Kind, load: Load) -> f64 {
         let predicted = costs.predict_ms(kind, load);
-        let is_whole = match kind {
-            Kind::Raster => self.base.is_whole(),
-            Kind::Resolve | Kind::Light => self.base.is_whole() || !self.motion.has_its_light,
-            _ => true,
-        };
-        if is_whole {
+        if kind != Kind::Raster || self.base.is_whole() {
             costs.learn(kind, load, self.stage_ms);
         }
         predicted

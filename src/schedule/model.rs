@@ -52,8 +52,7 @@ pub enum Kind {
     Shade,
     /// Colouring the first image.
     Resolve,
-    /// The same where some pixels are shaded by the illumination equation: what that takes beyond interpolation is the pixels' part, all
-    /// the rest the items'.
+    /// Shading pixels by the illumination equation while they get their first colours: what that takes beyond interpolation.
     Light,
     /// Illuminating nodes of triangles that will have curved colours.
     Curve,
@@ -133,6 +132,17 @@ impl Load {
     }
 }
 
+impl Load {
+    /// Both parts in milliseconds.
+    fn millis(self) -> [f64; 2] {
+        [self.items_ns * 1e-6, self.pixels_ns * 1e-6]
+    }
+
+    fn square(self) -> f64 {
+        self.millis().map(|ms| ms * ms).iter().sum()
+    }
+}
+
 /// Real milliseconds per nominal millisecond of a kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rate {
@@ -203,7 +213,7 @@ impl Rate {
             return self.step(load, predicted * (ratio - 1.0) / f64::from(seen + 1));
         }
         let surprise = ratio.clamp(1.0 / MOST_SURPRISE, MOST_SURPRISE);
-        self.spread += SPREAD_STEP * ((surprise - 1.0).abs() - self.spread);
+        self.note_surprise(surprise);
         self.step(load, STEP * predicted * (surprise - 1.0));
     }
 
@@ -219,12 +229,21 @@ impl Rate {
 
     /// Changes the rate as little as possible, so that the load is predicted to take `ms` more.
     fn step(&mut self, load: Load, ms: f64) {
-        let [x, y] = [load.items_ns * 1e-6, load.pixels_ns * 1e-6];
-        let scale = ms / (x * x + y * y);
+        self.add(load, ms / load.square());
+    }
+
+    /// Adds a multiple of the load, in milliseconds, to both parts.
+    fn add(&mut self, load: Load, scale: f64) {
         // Loads of some picoseconds have no square in f64.
         if scale.is_finite() {
+            let [x, y] = load.millis();
             self.set(self.items + scale * x, self.pixels + scale * y);
         }
+    }
+
+    /// Takes a measurement that was `surprise` times what was predicted into account as far as the typical deviation is concerned.
+    fn note_surprise(&mut self, surprise: f64) {
+        self.spread += SPREAD_STEP * ((surprise - 1.0).abs() - self.spread);
     }
 }
 
@@ -263,6 +282,33 @@ impl CostModel {
     /// Takes note that the work took `ms` milliseconds.
     pub fn learn(&mut self, kind: Kind, load: Load, ms: f64) {
         self.rate_mut(kind).learn(load, ms);
+    }
+
+    /// Takes note that work of two kinds took `ms` milliseconds together. The second kind is the one that is less well known: while nothing
+    /// has been measured of it, it gets all that the first is not predicted to take. Where there is no load of it, only the first learns.
+    pub fn learn_both(&mut self, [first, second]: [(Kind, Load); 2], ms: f64) {
+        let predicted = [first, second].map(|(kind, load)| self.predict_ms(kind, load));
+        let total = predicted[0] + predicted[1];
+        if second.1.square() == 0.0 {
+            return self.learn(first.0, first.1, ms);
+        }
+        if self.rate(second.0).seen == 0 {
+            // Not less than a fraction: what is left may be no more than noise.
+            let rest = (ms - predicted[0]).max(predicted[1] / (MOST_SURPRISE * MOST_SURPRISE));
+            return self.learn(second.0, second.1, rest);
+        }
+        let ratio = ms / total;
+        if !(ratio > 0.0 && ratio.is_finite()) {
+            return;
+        }
+        let surprise = ratio.clamp(1.0 / MOST_SURPRISE, MOST_SURPRISE);
+        let square = first.1.square() + second.1.square();
+        let scale = STEP * total * (surprise - 1.0) / square;
+        for (kind, load) in [first, second] {
+            let rate = self.rate_mut(kind);
+            rate.note_surprise(surprise);
+            rate.add(load, scale);
+        }
     }
 
     /// Lowers the rate of work that was not admitted though a whole frame was there for it.
@@ -355,6 +401,25 @@ mod tests {
             );
         }
         assert!(total / 100.0 < 0.08, "{total} with {rate:?}");
+    }
+
+    #[test]
+    fn two_kinds_are_told_apart_by_what_they_take_together() {
+        let mut model = CostModel::default();
+        let (first, second) = (Load::of_pixels(1e6), |part| Load::of_pixels(2e6 * part));
+        let truth = |part: f64| 0.5 * 1.0 + 3.0 * 2.0 * part;
+        let mut state = 3;
+        for round in 0..300 {
+            let part = match round % 3 {
+                0 => 0.0,
+                _ => noise(&mut state),
+            };
+            let loads = [(Kind::Resolve, first), (Kind::Light, second(part))];
+            model.learn_both(loads, truth(part) * (0.97 + 0.06 * noise(&mut state)));
+        }
+        let rates = [Kind::Resolve, Kind::Light].map(|kind| model.predict_ms(kind, first));
+        assert!((rates[0] - 0.5).abs() < 0.05, "{rates:?}");
+        assert!((rates[1] - 3.0).abs() < 0.3, "{rates:?}");
     }
 
     #[test]

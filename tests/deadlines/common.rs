@@ -105,9 +105,7 @@ pub(crate) fn options(method: Method, threads: usize, clock: Arc<CountingClock>)
 /// What work takes on a machine that seems to take so many times as long as nominal to light pixels of a first image.
 pub(crate) fn lighting_takes(times: f64) -> CostModel {
     let mut costs = CostModel::default();
-    // What is measured first counts for all of it, the second half.
-    costs.learn(Kind::Light, Load::of_items(1e6), 1.0);
-    costs.learn(Kind::Light, Load::of_pixels(1e6), 2.0 * times - 1.0);
+    costs.learn(Kind::Light, Load::of_pixels(1e6), times);
     costs
 }
 

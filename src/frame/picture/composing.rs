@@ -29,9 +29,6 @@ const MOST_LIT_COST: f32 = 1.5;
 /// Or if at least this share of the image can be.
 const LARGE_SHARE: f64 = 0.5;
 
-/// From so many the time for one is found.
-const MANY_PIXELS: u64 = 1 << 20;
-
 /// How a first image is composed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::frame) struct Composition {
@@ -60,23 +57,22 @@ impl Composition {
 impl Studio<'_> {
     /// Milliseconds that giving the image of `view` its colours will probably not exceed.
     pub(in crate::frame) fn colouring_ms(&self, view: &View, composition: &Composition) -> f64 {
-        let (kind, load) = self.colouring_load(view, composition);
-        self.costs.predict_at_most_ms(kind, load)
+        let loads = self.colouring_loads(view, composition);
+        let ms = loads.map(|(kind, load)| self.costs.predict_at_most_ms(kind, load));
+        ms.iter().sum()
     }
 
-    /// What giving the image its colours takes.
-    pub(super) fn colouring_load(&self, view: &View, composition: &Composition) -> (Kind, Load) {
+    /// What giving the image its colours takes: interpolation, and lighting.
+    pub(super) fn colouring_loads(
+        &self,
+        view: &View,
+        composition: &Composition,
+    ) -> [(Kind, Load); 2] {
         let lights = self.world.lights.len();
         let mut load = self.load.resolve(self.method, lights, view);
         load.pixels_ns += composition.curves.load.pixels_ns;
-        if composition.lit.pixels == 0 {
-            return (Kind::Resolve, load);
-        }
-        let load = Load {
-            items_ns: load.items_ns + load.pixels_ns,
-            pixels_ns: composition.lit_ns(lights),
-        };
-        (Kind::Light, load)
+        let lit = Load::of_pixels(composition.lit_ns(lights));
+        [(Kind::Resolve, load), (Kind::Light, lit)]
     }
 }
 
@@ -289,19 +285,11 @@ impl Timing<'_> {
         composition: &Composition,
         other_ms: f64,
     ) -> f64 {
-        let spare_ms = |pixels: u64| {
-            let mut lit = *composition;
-            lit.lit.pixels = pixels;
-            self.ms_to_spare(studio, view, &lit) - other_ms
-        };
-        // The more pixels are lit the less time is left, each taking the same.
-        let (with_one, with_many) = (spare_ms(1), spare_ms(1 + MANY_PIXELS));
-        let each_ms = (with_one - with_many) / MANY_PIXELS as f64;
-        // Without a deadline that is no number.
-        if each_ms > 0.0 && with_one > 0.0 {
-            with_one / each_ms
-        } else {
-            0.0
-        }
+        let spare_ms = self.ms_to_spare(studio, view, composition) - other_ms;
+        let each = Load::of_pixels(f64::from(cost::lit_pixel(studio.world.lights.len())));
+        let each_ms = studio.costs.predict_at_most_ms(Kind::Light, each)
+            * studio.stages.slowness(studio.predicted);
+        // Rates are positive; without a deadline there is no time to spare.
+        (spare_ms / each_ms).max(0.0)
     }
 }
