@@ -26,9 +26,6 @@ const LEAST_SAVED_NS: f32 = 0.1;
 /// Images with fewer pixels to a visible triangle than this share of the least that is divided are not looked through.
 const LOOK_FROM: f32 = 0.25;
 
-/// What curving is thought to take at most, as a multiple of what is predicted.
-const CAUTION: f64 = 1.25;
-
 /// What has been curved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Curves {
@@ -98,7 +95,8 @@ fn rule(lights: usize, is_timed: bool) -> CurvingRule {
     }))
 }
 
-/// Curves what the budget allows, `ending_ms` being what the first image and handing it over will take from then on.
+/// Curves what the budget allows, `ending_ms` being what the first image and handing it over will take from then on. If `only_large_ones`, nothing
+/// unless at least half of the image consists of triangles that can be divided most finely.
 #[expect(
     clippy::too_many_arguments,
     reason = "what is curved, and under which budget"
@@ -112,6 +110,7 @@ pub(super) fn curve(
     costs: &CostModel,
     allowance: &Allowance<'_>,
     ending_ms: f64,
+    only_large_ones: bool,
 ) -> Curves {
     let lights = world.lights.len();
     let rule = rule(lights, allowance.is_timed());
@@ -120,6 +119,9 @@ pub(super) fn curve(
         return Curves::default();
     }
     base.begin_curving(backend, rule);
+    if only_large_ones && base.curving().finest_pixels() * 2 < base.covered_pixels() {
+        return Curves::default();
+    }
     let replayed = allowance.replayed_rounds();
     let mut done = CurvedLoad::default();
     let mut rounds = 0;
@@ -141,7 +143,7 @@ pub(super) fn curve(
             None => {
                 let nodes = Load::of_items(next.nodes_ns - done.nodes_ns);
                 let ms = costs.predict_at_most_ms(Kind::Curve, nodes) + colouring_ms(costs, next);
-                allowance.affords(next.units(), ms * CAUTION + ending_ms)
+                allowance.affords(next.units(), ms + ending_ms)
             }
         };
         if !may_begin {

@@ -74,9 +74,9 @@ pub const CURVE_PART_NS: f32 = 25.0;
 /// See [`CURVE_NS`]: a part for each node, without its illumination.
 pub const CURVE_NODE_NS: f32 = 6.0;
 /// What a pixel of a curved triangle takes beyond one of another: of a single part.
-pub const CURVED_PIXEL_NS: f32 = 0.3;
+pub const CURVED_PIXEL_NS: f32 = 0.25;
 /// The same of one with several parts.
-pub const PARTED_PIXEL_NS: f32 = 1.0;
+pub const PARTED_PIXEL_NS: f32 = 0.6;
 /// What a pixel takes beyond one that is interpolated if it is shaded while it gets its first colour: a fixed part, and one for each
 /// light.
 pub const LIT_PIXEL_NS: f32 = 1.2;

@@ -285,12 +285,17 @@ impl CostModel {
     }
 
     /// Takes note that work of two kinds took `ms` milliseconds together. The second kind is the one that is less well known: while nothing
-    /// has been measured of it, it gets all that the first is not predicted to take. Where there is no load of it, only the first learns.
+    /// has been measured of it alone, it gets all that the first is not predicted to take. Where there is no load of it, only the first learns.
     pub fn learn_both(&mut self, [first, second]: [(Kind, Load); 2], ms: f64) {
         let predicted = [first, second].map(|(kind, load)| self.predict_ms(kind, load));
         let total = predicted[0] + predicted[1];
         if second.1.square() == 0.0 {
             return self.learn(first.0, first.1, ms);
+        }
+        if self.rate(first.0).seen == 0 {
+            // Nothing is known of either, so both are off by the same.
+            self.learn(first.0, first.1, ms * predicted[0] / total);
+            return self.learn(second.0, second.1, ms * predicted[1] / total);
         }
         if self.rate(second.0).seen == 0 {
             // Not less than a fraction: what is left may be no more than noise.

@@ -113,9 +113,10 @@ impl Picture {
         if self.motion.has_its_light && !was_mixed {
             return;
         }
-        if !may_be_lit || !self.can_be_lit_for_the_most_part(studio, &view, &timing) {
-            self.curve(studio, &view, &mut timing);
-        }
+        let may_be_lit_only = may_be_lit
+            && timing.pixels_to_spare(studio, &view, &Composition::default(), 0.0)
+                >= LARGE_SHARE * self.base.covered_pixels() as f64;
+        self.curve(studio, &view, &mut timing, may_be_lit_only);
         if may_be_lit {
             self.light_some(studio, &view, &mut timing);
         }
@@ -160,19 +161,15 @@ impl Picture {
         is_chosen
     }
 
-    /// Whether so much of the image can be lit that little is left for which it would pay to curve anything.
-    fn can_be_lit_for_the_most_part(
-        &self,
-        studio: &Studio<'_>,
+    /// Divides large triangles, as far as there is time. What is for the most part of smaller ones, and may be lit for the most part, is lit
+    /// only.
+    fn curve(
+        &mut self,
+        studio: &mut Studio<'_>,
         view: &View,
-        timing: &Timing<'_>,
-    ) -> bool {
-        let pixels = timing.pixels_to_spare(studio, view, &Composition::default(), 0.0);
-        pixels >= LARGE_SHARE * self.base.covered_pixels() as f64
-    }
-
-    /// Divides large triangles, as far as there is time.
-    fn curve(&mut self, studio: &mut Studio<'_>, view: &View, timing: &mut Timing<'_>) {
+        timing: &mut Timing<'_>,
+        may_be_lit_only: bool,
+    ) {
         let ending_ms = timing.ending_ms(studio, view, &Composition::default());
         let curves = curves::curve(
             &mut self.base,
@@ -183,6 +180,7 @@ impl Picture {
             studio.costs,
             timing.allowance,
             ending_ms,
+            may_be_lit_only,
         );
         let ms = timing.look();
         let load = Load::of_items(curves.load.nodes_ns);

@@ -176,6 +176,13 @@ impl Curving {
         counts
     }
 
+    /// Pixels of the triangles that can be divided most finely.
+    #[must_use]
+    pub fn finest_pixels(&self) -> u64 {
+        let finest = self.jobs().filter(|job| job.most == curved::MOST_DIVISIONS);
+        finest.map(|job| u64::from(job.pixels)).sum()
+    }
+
     /// What it has come to.
     #[must_use]
     pub fn counts(&self) -> CurvingCounts {
