@@ -51,22 +51,26 @@ pub fn part_index(n: u32, i: u32, j: u32, is_upright: bool) -> usize {
 #[must_use]
 pub fn part_nodes(i: u32, j: u32, is_upright: bool) -> [[u32; 2]; 6] {
     let (a, b) = (2 * i, 2 * j);
-    let steps = [[0, 0], [2, 0], [0, 2], [1, 0], [0, 1], [1, 1]];
-    steps.map(|[da, db]| {
-        if is_upright {
-            [a + da, b + db]
-        } else {
-            [a + 2 - da, b + 2 - db]
-        }
-    })
+    // An upside-down part begins at the far corner of its square, and goes backwards.
+    let (a, b, step) = if is_upright {
+        (a, b, 1_u32)
+    } else {
+        (a + 2, b + 2, u32::MAX)
+    };
+    let at = |across: u32, down: u32| {
+        let along = |from: u32, steps: u32| from.wrapping_add(steps.wrapping_mul(step));
+        [along(a, across), along(b, down)]
+    };
+    [at(0, 0), at(2, 0), at(0, 2), at(1, 0), at(0, 1), at(1, 1)]
 }
 
 /// The quadratic through the values of six nodes, ordered like [`part_nodes`].
 #[inline]
 #[must_use]
 pub fn through(nodes: [[f32; 3]; 6]) -> PartColours {
-    std::array::from_fn(|channel| {
-        let [o, p, q, op, oq, pq] = nodes.map(|colour| colour[channel]);
+    let [o, p, q, op, oq, pq] = nodes;
+    std::array::from_fn(|c| {
+        let (o, p, q, op, oq, pq) = (o[c], p[c], q[c], op[c], oq[c], pq[c]);
         let u = 4.0 * op - 3.0 * o - p;
         let v = 4.0 * oq - 3.0 * o - q;
         let uu = 2.0 * (o + p) - 4.0 * op;

@@ -51,21 +51,27 @@ impl Fitting<'_> {
 
     fn fit_triangle(&self, job: &Job, colours: &Vec3s, parts: &mut [PartColours]) {
         let n = job.divisions;
-        let m = 2 * n;
-        let mut nodes = [[0.0; 3]; MOST_NODES];
-        for a in 0..=m {
-            for b in 0..=m - a {
-                nodes[node_index(n, a, b)] = job.node(colours, n, [a, b]);
+        let nodes = job.nodes(colours);
+        let edges = [0, 1, 2].map(|edge| self.divisions_at(job, edge));
+        if edges.iter().all(|&divisions| divisions == n) {
+            for_each_part(n, |[i, j], is_upright| {
+                parts[part_index(n, i, j, is_upright)] = nodes.part(n, [i, j], is_upright);
+            });
+            return;
+        }
+        let mut changed = [[0.0; 3]; MOST_NODES];
+        for a in 0..=2 * n {
+            for b in 0..=2 * n - a {
+                changed[node_index(n, a, b)] = nodes.at(n, [a, b]);
             }
         }
-        for edge in 0..3 {
-            let coarser = self.divisions_at(job, edge);
+        for (edge, coarser) in (0..).zip(edges) {
             if coarser < n {
-                coarsen_edge(n, coarser, |q| edge_node(n, edge, q), &mut nodes);
+                coarsen_edge(n, coarser, |q| edge_node(n, edge, q), &mut changed);
             }
         }
         for_each_part(n, |[i, j], is_upright| {
-            let six = part_nodes(i, j, is_upright).map(|[a, b]| nodes[node_index(n, a, b)]);
+            let six = part_nodes(i, j, is_upright).map(|[a, b]| changed[node_index(n, a, b)]);
             parts[part_index(n, i, j, is_upright)] = curved::through(six);
         });
     }

@@ -13,15 +13,16 @@
 //! What becomes of a triangle depends on its pixels and its neighbours' alone, not on threads.
 
 mod fitting;
+mod nodes;
 
-use super::estimate::squared_codes;
-use crate::geometry::curved::{self, PartColours, node_count, node_index, part_nodes};
+use crate::geometry::curved::{self, node_count};
 use crate::geometry::{CurvedTriangles, Vec3s};
 use crate::illumination::{ActiveLights, ShadingKit, shade_points};
 use crate::output::Encoding;
 use crate::parallel::Exec;
 use crate::scene::{View, World};
 use fitting::Fitting;
+use nodes::Nodes;
 use std::ops::Range;
 
 /// Mean squared error, in squared codes, up to which fewer parts are good enough.
@@ -334,33 +335,19 @@ impl Share {
 fn push_nodes(n: u32, [o, p, q]: [[f32; 3]; 3], to: &mut Vec3s) {
     let m = 2 * n;
     let scale = 1.0 / m as f32;
-    let first = to.len();
-    to.resize(first + node_count(n));
     for (k, to) in [&mut to.x, &mut to.y, &mut to.z].into_iter().enumerate() {
         let (across, down) = ((p[k] - o[k]) * scale, (q[k] - o[k]) * scale);
-        let mut rest = &mut to[first..];
         for a in 0..=m {
-            let (row, below) = rest.split_at_mut((m - a + 1) as usize);
             let start = o[k] + across * a as f32;
-            for (b, node) in row.iter_mut().enumerate() {
-                *node = start + down * b as f32;
-            }
-            rest = below;
+            to.extend((0..=m - a).map(|b| start + down * b as f32));
         }
     }
 }
 
 impl Job {
-    /// A node of the triangle divided by `n`.
-    #[inline]
-    fn node(&self, colours: &Vec3s, n: u32, [a, b]: [u32; 2]) -> [f32; 3] {
-        let step = self.finest / n;
-        colours.get(self.first_node + node_index(self.finest, a * step, b * step))
-    }
-
-    /// The quadratic over a part of the triangle divided by `n`.
-    fn part(&self, colours: &Vec3s, n: u32, [i, j]: [u32; 2], is_upright: bool) -> PartColours {
-        curved::through(part_nodes(i, j, is_upright).map(|node| self.node(colours, n, node)))
+    /// Its nodes.
+    fn nodes<'a>(&self, colours: &'a Vec3s) -> Nodes<'a> {
+        Nodes::new(colours, self.first_node, self.finest)
     }
 
     /// Whether it is to be divided by `n`: in the first round, or where less is not enough, or too little to tell.
@@ -379,12 +366,13 @@ impl Job {
 
     /// Divides it by no more than it takes, and estimates the error that is left.
     fn coarsen(&mut self, encoding: Encoding, colours: &Vec3s) {
+        let nodes = self.nodes(colours);
         self.divisions = self.finest;
         while self.divisions > 0 {
             let coarser = self.divisions / 2;
             let error = match coarser {
-                0 => self.linear_error(encoding, colours),
-                n => self.error_of(encoding, colours, n),
+                0 => nodes.linear_error(encoding),
+                n => nodes.error_of(encoding, n),
             };
             if self.divisions == self.finest {
                 self.error = error * GAIN / self.finest as f32;
@@ -398,48 +386,10 @@ impl Job {
             self.divisions = coarser;
         }
     }
-
-    /// Mean squared error of Gouraud shading, at the middles of the edges.
-    fn linear_error(&self, encoding: Encoding, colours: &Vec3s) -> f32 {
-        let at = |node| self.node(colours, 1, node);
-        let corners = [[0, 0], [2, 0], [0, 2]].map(at);
-        let middles = [[1, 0], [1, 1], [0, 1]].map(at);
-        let mut sum = 0.0;
-        for (k, middle) in middles.into_iter().enumerate() {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            let off = std::array::from_fn(|c| (a[c] + b[c]) * 0.5 - middle[c]);
-            sum += squared_codes(encoding, middle, off);
-        }
-        // A quadratic that is as large in the middles of the edges has so much of their mean square; see `estimate`.
-        sum * (8.0 / 45.0 * 2.0)
-    }
-
-    /// Mean squared error of division by `n`, at the nodes of the next finer one.
-    fn error_of(&self, encoding: Encoding, colours: &Vec3s, n: u32) -> f32 {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for_each_part(n, |[i, j], is_upright| {
-            let part = self.part(colours, n, [i, j], is_upright);
-            for [p, q] in TESTS {
-                let [a, b] = if is_upright {
-                    [4 * i + p, 4 * j + q]
-                } else {
-                    [4 * i + 4 - p, 4 * j + 4 - q]
-                };
-                let want = self.node(colours, 2 * n, [a, b]);
-                let got = curved::colour_at(&part, p as f32 * 0.25, q as f32 * 0.25);
-                let off = std::array::from_fn(|c| got[c] - want[c]);
-                sum += squared_codes(encoding, want, off);
-                count += 1.0;
-            }
-        });
-        sum / count
-    }
 }
 
-/// Nodes of the next finer division well inside a part, in quarters of its edges: three of the nine that are not its own.
-const TESTS: [[u32; 2]; 3] = [[1, 1], [2, 1], [1, 2]];
-
 /// Calls `f` with row and column of each part, and whether it is upright.
+#[inline(always)]
 fn for_each_part(n: u32, mut f: impl FnMut([u32; 2], bool)) {
     for i in 0..n {
         for j in 0..n - i {
