@@ -126,14 +126,7 @@ pub(super) fn curve(
     let mut done = CurvedLoad::default();
     let mut rounds = 0;
     let mut taken_back = false;
-    let cap: u32 = std::env::var("CAP")
-        .ok()
-        .and_then(|v| v.parse().ok())
-        .unwrap_or(8);
     for n in DIVISIONS {
-        if n > cap {
-            break;
-        }
         let next = CurvedLoad::of(&base.curving().with_round(n), lights);
         if next == done {
             break;
