@@ -73,6 +73,18 @@ pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
     })
 }
 
+/// What became of highlights, in words. Where all pixels were shaded as they got their colours, nobody looked for any.
+fn highlights(stats: &FrameStats) -> String {
+    let pixels = stats.phong_pixels;
+    if pixels > 0 && pixels == stats.covered_pixels && stats.pht == 0 {
+        return format!("  highlights not looked for: all {pixels} pixels shaded by Phong at once");
+    }
+    format!(
+        "  highlights {} PHTs found, {} visible, {} refined; {pixels} pixels shaded by Phong",
+        stats.pht, stats.pht_visible, stats.refined
+    )
+}
+
 /// What is proved of the image, in words.
 pub(super) fn certificate(stats: &FrameStats) -> Option<String> {
     let (bound, share) = stats.error_bound.zip(stats.unproved_share)?;
@@ -117,10 +129,7 @@ impl FrameReport {
                 stats.triangles_subdivided,
                 stats.leaves
             ),
-            format!(
-                "  highlights {} PHTs found, {} visible, {} refined; {} pixels shaded by Phong",
-                stats.pht, stats.pht_visible, stats.refined, stats.phong_pixels
-            ),
+            highlights(stats),
             format!("  skipped    {}", self.skipped()),
         ];
         if stats.estimated_error.is_finite() {

@@ -1,6 +1,6 @@
 //! What work takes on this machine, found out before the first frame.
 //!
-//! A small scene is drawn, refined, handed over and enlarged a few times, by a renderer of its own that runs as the engine will. That is
+//! A small scene is drawn, refined or lit, handed over and enlarged a few times, by a renderer of its own that runs as the engine will. That is
 //! a start; the engine goes on learning from every frame.
 
 use super::Method;
@@ -20,6 +20,9 @@ const MOST_ROUNDS: u32 = 8;
 
 /// Refinement of a round, in work units.
 const UNITS: u64 = 400_000;
+
+/// Triangles that are lit in another image of it.
+const LIT: u32 = 300;
 
 /// Pixels of the image: more than fit into the caches of most machines, as those of real frames.
 const SIZE: [u32; 2] = [1280, 720];
@@ -61,17 +64,22 @@ pub(super) fn calibrate(
 
 fn rounds(renderer: &mut Renderer, exec: Exec, clock: &dyn Clock, start_ms: f64, scene: &Scene) {
     let cancel = CancelToken::new();
-    let reduced = Budget::Replay(FrameRecord {
-        divisor: 2,
-        images: 1,
-        ..FrameRecord::default()
-    });
+    let replay = |divisor, lit| {
+        Budget::Replay(FrameRecord {
+            is_timed: true,
+            divisor,
+            images: 1,
+            lit: [lit, 0],
+            ..FrameRecord::default()
+        })
+    };
+    let budgets = [Budget::Work(UNITS), replay(1, LIT), replay(2, 0)];
     let mut frame = Frame::new(SIZE[0], SIZE[1]);
     for round in 0..MOST_ROUNDS {
         if clock.now_ms() - start_ms > LAST_ROUND_MS {
             return;
         }
-        for budget in [Budget::Work(UNITS), reduced] {
+        for budget in budgets {
             renderer.shelf.forget();
             // All pixels are handed over.
             frame.pixels_mut();

@@ -13,7 +13,7 @@ use crate::output::{Encoding, Frame, Rect, Target};
 use crate::parallel::Exec;
 use crate::refine::paper::PaperRule;
 use crate::scene::{Scene, World};
-use crate::schedule::{Allowance, Budget, CancelToken, CostModel};
+use crate::schedule::{Allowance, Budget, CancelToken, CostModel, FrameRecord};
 use crate::simd::SimdLevel;
 use std::sync::Arc;
 
@@ -41,11 +41,15 @@ pub struct Engine {
     renderer: Renderer,
 }
 
-/// The first frame touches memory; those after it are for threads that have just been started.
-const WARM_UP_FRAMES: usize = 3;
+/// Rounds of frames that warm up, after the first frames, which touch memory: for threads that have just been started, and for what is
+/// known of costs.
+const WARM_UP_ROUNDS: usize = 4;
 
-/// Refinement of a frame that warms up, in work units.
+/// Refinement of such a frame, in work units.
 const WARM_UP_UNITS: u64 = 1_000_000;
+
+/// Triangles that are lit in others.
+const WARM_UP_LIT: u32 = 1_000;
 
 impl Engine {
     /// An engine with default options, made ready for `scene`: vertices welded, clusters and bounding volumes built.
@@ -166,9 +170,32 @@ impl Engine {
     pub fn warm_up(&mut self, scene: &Scene, width: u32, height: u32) {
         let mut frame = Frame::new(width, height);
         let frames = self.renderer.frames;
-        for _ in 0..WARM_UP_FRAMES {
+        let replay = |divisor, lit| {
+            Budget::Replay(FrameRecord {
+                is_timed: true,
+                divisor,
+                images: 1,
+                lit: [lit, 0],
+                ..FrameRecord::default()
+            })
+        };
+        // An image of a lower resolution has memory of its own.
+        let (reduced, lit) = (replay(2, 0), replay(1, WARM_UP_LIT));
+        let refined = Budget::Work(WARM_UP_UNITS);
+        // What touching memory takes is nothing to learn from.
+        let costs = self.renderer.costs.clone();
+        for budget in [reduced, refined] {
             self.forget();
-            self.render(scene, Budget::Work(WARM_UP_UNITS), &mut frame);
+            self.render(scene, budget, &mut frame);
+        }
+        self.renderer.costs = costs;
+        for _ in 0..WARM_UP_ROUNDS {
+            for budget in [refined, lit] {
+                self.forget();
+                // As if it were another's, all of it is handed over.
+                frame.pixels_mut();
+                self.render(scene, budget, &mut frame);
+            }
         }
         self.forget();
         // Nobody has seen these frames.
