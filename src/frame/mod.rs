@@ -7,7 +7,7 @@
 //! | `engine.rs` | the engine as its users see it; `options.rs`, `method.rs`, `stats.rs` what goes in and comes out |
 //! | `renderer.rs` | the frame loop |
 //! | `shelf.rs` | the pictures: one at full resolution, one at a lower one, and one that is still shown while that is drawn anew |
-//! | `picture.rs` | an image in the making, stage by stage, each of which may be interrupted |
+//! | `picture.rs` | an image in the making, stage by stage, each of which may be interrupted; `picture/composing.rs` how each triangle of a first image gets its colours, `picture/refining.rs` what comes after it |
 //! | `motion.rs` | which triangles have moved since a picture was drawn |
 //! | `base.rs`, `curves.rs` | what the stages of a first image do |
 //! | `refinement/` | makes it better; `refine_first.rs` is how, where the backend cannot repaint, `tiles.rs` is a simple rival, `baseline.rs` the paper's methods |

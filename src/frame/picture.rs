@@ -8,7 +8,7 @@
 //! | `Empty` | cull clusters, then rasterize | no |
 //! | `Rasterizing` | find the owner of every pixel | yes |
 //! | `Lighting` | illuminate the vertices of triangles that own a pixel | yes |
-//! | `Colouring` | give every pixel its colour | yes |
+//! | `Colouring` | [compose](composing) the image, then give every pixel its colour | yes |
 //! | `Coloured` | show it | |
 //! | `Done` | refine it | yes |
 //!

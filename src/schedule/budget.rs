@@ -10,8 +10,8 @@ use crate::clock::Clock;
 /// A frame under [`Millis`](Self::Millis) returns by its deadline, handing the image over included. The clock is looked at
 /// between pieces of work of some 50 microseconds.
 ///
-/// 1. When the first image, Gouraud-shaded, fits into the budget, it is drawn, and what is left of the time refines it. The next
-///    frame of a still view goes on from there.
+/// 1. When the first image, Gouraud-shaded, fits into the budget, it is drawn, and what is left of the time refines it; as far as that can be
+///    foretold, before it gets its colours: if all of it can be shaded per pixel, it is. The next frame of a still view goes on from there.
 /// 2. When it does not fit because of its pixels, it is drawn at a **lower resolution**, a half to a quarter of the width and height, and
 ///    enlarged ([`Outcome::Reduced`](crate::frame::Outcome::Reduced)). While the view stays, the following frames draw it at full
 ///    resolution.
@@ -27,7 +27,8 @@ use crate::clock::Clock;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
     /// Wall-clock milliseconds from the call of `render` to its return, by the engine's clock. Of an image begun under such a budget,
-    /// what refinement found out in the images before decides what is looked at first; under any other budget it has no influence. Zero buys a first image at full resolution,
+    /// what refinement found out in the images before decides what is looked at first, and final images may differ by a code from those under other budgets,
+    /// on which nothing that came before has any influence. Zero buys a first image at full resolution,
     /// however long that takes, and no refinement.
     Millis(f64),
     /// Work units: nominal nanoseconds of refinement (see [`cost`](super::cost)). The result is the same, bit for

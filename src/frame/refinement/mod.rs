@@ -11,7 +11,8 @@
 //! * A **painting** piece paints patches off that list, in order. Large areas have been cut into patches that each take
 //!   a fraction of a piece. The list survives the end of a frame; planning goes on when it is empty.
 //!
-//! A backend that cannot repaint has no painting pieces: see [`drawn_once`].
+//! What is shaded while the first image gets its colours is done before any of that begins: see [`lighting`]. A backend that cannot repaint has no
+//! painting pieces: see [`drawn_once`].
 //!
 //! Plans depend on nominal costs and estimates only, and patches are painted in list order until the budget ends, so
 //! that a budget in work units gives the same image for any number of threads.
