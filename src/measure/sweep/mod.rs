@@ -2,7 +2,7 @@
 //!
 //! **Cold** means that the engine has been told to forget its image, while memory has been touched and the pool is
 //! awake: some frames under the same budget are rendered and thrown away just before. (After one, frame times on a shared virtual machine were two
-//! thirds of their median apart; after [`LEAD_FRAMES`], a twentieth.)
+//! thirds of their median apart; after some more, a twentieth.)
 //!
 //! Budgets that mean something on any machine are written `G + f (P - G)`, with `G` and `P` the times of a Gouraud and a
 //! Phong frame in the same run: `f = 0` buys Gouraud shading, `f = 1` Phong shading everywhere. Both are
