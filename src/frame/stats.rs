@@ -207,7 +207,8 @@ pub struct FrameStats {
     /// Pixels that some triangle owns.
     pub covered_pixels: u64,
     /// Potentially highlighted triangles: those that pass the paper's H1 and H2 tests for some light. Only triangles that
-    /// own a pixel are tested, so far as the budget went; none by methods that draw one image and are done.
+    /// own a pixel are tested, so far as the budget went; none by methods that draw one image and are done, nor where a deadline left time to shade all pixels at
+    /// once.
     pub pht: u64,
     /// The same.
     pub pht_visible: u64,
