@@ -73,6 +73,35 @@ fn an_image_lit_as_a_whole_is_that_of_per_pixel_shading_and_final() {
     }
 }
 
+/// Nothing of a refined image is left when the next one is lit as a whole.
+#[test]
+fn an_image_lit_after_a_refined_one_is_like_any_other() {
+    let scene = load("lights100");
+    let mut engine = engine(&scene, Method::Adaptive, 1);
+    // Not curved, and under many lights, so that triangles are subdivided.
+    let [width, height] = [640, 360];
+    let mut frame = Frame::new(width, height);
+    let mut refined = engine.render(&scene, composed(0, 0), &mut frame);
+    while refined.leaves == 0 && !refined.converged {
+        refined = engine.render(&scene, Budget::Work(50_000), &mut frame);
+    }
+    assert!(refined.leaves > 0 && refined.pht > 0, "{refined:?}");
+
+    let mut moved = scene.clone();
+    let mut camera = scene.camera().clone();
+    camera.position.x += 0.1;
+    moved.set_camera(camera);
+    let everything = composed(0, FrameRecord::EVERYTHING);
+    let stats = engine.render(&moved, everything, &mut frame);
+    let mut want = Frame::new(width, height);
+    let mut another = self::engine(&moved, Method::Adaptive, 1);
+    let fresh = another.render(&moved, everything, &mut want);
+    assert!(frame.pixels() == want.pixels());
+    let of = |stats: &FrameStats| (stats.leaves, stats.pht, stats.refined, stats.phong_pixels);
+    assert_eq!(of(&stats), of(&fresh));
+    assert_eq!(of(&stats), (0, 0, 0, stats.covered_pixels));
+}
+
 #[test]
 fn lit_triangles_are_those_of_per_pixel_shading_and_all_others_as_without() {
     for name in SCENES {

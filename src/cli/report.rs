@@ -73,11 +73,11 @@ pub(super) fn frame_json(number: u32, stats: &FrameStats) -> Value {
     })
 }
 
-/// What became of highlights, in words. Where all pixels were shaded as they got their colours, nobody looked for any.
+/// What became of highlights, in words.
 fn highlights(stats: &FrameStats) -> String {
     let pixels = stats.phong_pixels;
     if pixels > 0 && pixels == stats.covered_pixels && stats.pht == 0 {
-        return format!("  highlights not looked for: all {pixels} pixels shaded by Phong at once");
+        return format!("  highlights or none, all {pixels} pixels are shaded by Phong");
     }
     format!(
         "  highlights {} PHTs found, {} visible, {} refined; {pixels} pixels shaded by Phong",

@@ -73,6 +73,10 @@ pub(super) struct Picture {
     motion: Motion,
     /// How its first image is composed.
     composition: Composition,
+    /// Whether that was under a deadline.
+    is_composed_in_time: bool,
+    /// Whether some triangles of the image published last got other colours than interpolated ones.
+    is_mixed: bool,
     /// Whether refinement has begun with its first image before that is complete.
     is_planned: bool,
     /// Whether the stage in hand is yet to be begun.
@@ -114,6 +118,8 @@ impl Picture {
             is_begun: false,
             motion: Motion::default(),
             composition: Composition::default(),
+            is_composed_in_time: false,
+            is_mixed: false,
             is_planned: false,
             is_fresh: true,
             stage_ms: 0.0,
@@ -191,6 +197,7 @@ impl Picture {
     /// Notes that its image is the one to be shown and refined from now on.
     pub(super) fn publish(&mut self) {
         self.is_begun = false;
+        self.is_mixed = self.base.is_mixed();
         self.enter(Pass::Done);
     }
 

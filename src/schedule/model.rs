@@ -287,6 +287,9 @@ impl CostModel {
     /// Takes note that work of two kinds took `ms` milliseconds together. The second kind is the one that is less well known: while nothing
     /// has been measured of it alone, it gets all that the first is not predicted to take. Where there is no load of it, only the first learns.
     pub fn learn_both(&mut self, [first, second]: [(Kind, Load); 2], ms: f64) {
+        if !(ms > 0.0 && ms.is_finite()) {
+            return;
+        }
         let predicted = [first, second].map(|(kind, load)| self.predict_ms(kind, load));
         let total = predicted[0] + predicted[1];
         if second.1.square() == 0.0 {
@@ -303,15 +306,25 @@ impl CostModel {
             return self.learn(second.0, second.1, rest);
         }
         let ratio = ms / total;
-        if !(ratio > 0.0 && ratio.is_finite()) {
+        if !ratio.is_finite() {
             return;
         }
-        let surprise = ratio.clamp(1.0 / MOST_SURPRISE, MOST_SURPRISE);
+        // As for a kind alone: the first measurements count alike, whatever they say.
+        let seen = self.rate(second.0).seen;
+        let is_new = seen < FIRST;
+        let (surprise, share) = if is_new {
+            (ratio, 1.0 / f64::from(seen + 1))
+        } else {
+            (ratio.clamp(1.0 / MOST_SURPRISE, MOST_SURPRISE), STEP)
+        };
         let square = first.1.square() + second.1.square();
-        let scale = STEP * total * (surprise - 1.0) / square;
+        let scale = share * total * (surprise - 1.0) / square;
         for (kind, load) in [first, second] {
             let rate = self.rate_mut(kind);
-            rate.note_surprise(surprise);
+            rate.seen = rate.seen.saturating_add(1);
+            if !is_new {
+                rate.note_surprise(surprise);
+            }
             rate.add(load, scale);
         }
     }
@@ -411,6 +424,9 @@ mod tests {
     #[test]
     fn two_kinds_are_told_apart_by_what_they_take_together() {
         let mut model = CostModel::default();
+        let pixels = Load::of_pixels(1e6);
+        model.learn_both([(Kind::Resolve, pixels), (Kind::Light, pixels)], 0.0);
+        assert_eq!(model, CostModel::default(), "no time is no measurement");
         let (first, second) = (Load::of_pixels(1e6), |part| Load::of_pixels(2e6 * part));
         let truth = |part: f64| 0.5 * 1.0 + 3.0 * 2.0 * part;
         let mut state = 3;

@@ -78,8 +78,7 @@ impl Studio<'_> {
 
 impl Picture {
     /// Composes the image, if it lacks only its colours, so that there will be time to give it those and to hand it over, which takes
-    /// `handing_over_ms`.
-    /// `is_asked_for` says that it is of the scene and the camera as they are.
+    /// `handing_over_ms`. `is_asked_for` says that it is of the scene and the camera as they are.
     pub(in crate::frame) fn compose(
         &mut self,
         studio: &mut Studio<'_>,
@@ -87,13 +86,18 @@ impl Picture {
         handing_over_ms: f64,
         is_asked_for: bool,
     ) {
+        // Under a budget of another kind it is composed in another way, and so does a replay of this frame.
+        let is_stale = self.is_composed_in_time != allowance.is_timed();
+        if is_stale && (self.pass == Pass::Coloured || self.pass == Pass::Colouring) {
+            self.enter(Pass::Colouring);
+        }
         let is_due = self.pass == Pass::Colouring && self.is_fresh;
         let Some(view) = self.view.filter(|_| is_due) else {
             return;
         };
+        self.is_composed_in_time = allowance.is_timed();
         // In a replay it may have been asked for in a frame before, in which it was begun.
         let may_be_lit = is_asked_for || allowance.replayed_lit().is_some();
-        let was_mixed = self.base.is_mixed();
         self.decompose(studio.world);
         if studio.method != Method::Adaptive
             || self.divisor != 1
@@ -109,8 +113,8 @@ impl Picture {
         if timing.is_over() || may_be_lit && self.light_everything(studio, &view, &timing) {
             return;
         }
-        // Tiles that are kept have no other colours than interpolated ones, or lit ones.
-        if self.motion.has_its_light && !was_mixed {
+        // Tiles can be kept of an image that is interpolated as a whole, or lit as a whole, when this one is, too.
+        if self.motion.has_its_light && !self.is_mixed {
             return;
         }
         let may_be_lit_only = may_be_lit
@@ -258,9 +262,10 @@ impl Timing<'_> {
         deadline_ms.map_or(f64::NEG_INFINITY, |ms| ms - self.now_ms)
     }
 
-    /// Whether there is a deadline, and it has come.
+    /// Whether the frame has been cancelled, or there is a deadline, and it has come.
     fn is_over(&self) -> bool {
-        self.allowance.deadline_ms().is_some() && self.left_ms() <= 0.0
+        let has_deadline = self.allowance.deadline_ms().is_some();
+        self.allowance.is_cancelled() || has_deadline && self.left_ms() <= 0.0
     }
 
     /// Milliseconds to be reckoned with for giving the image its colours and handing it over.

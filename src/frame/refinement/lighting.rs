@@ -42,6 +42,8 @@ impl Refinement {
     /// Begins, and ends, with an image in which every pixel is lit. Nothing is found out about its triangles.
     pub(in crate::frame) fn begin_final(&mut self, world: &World, base: &BaseImage) {
         self.clear();
+        self.forest.reset(world);
+        self.places.reset(world.triangles.len());
         self.memory.next_image(world.triangles.len());
         let pixels = base.covered_pixels();
         self.certificate.begin(pixels);
@@ -50,11 +52,20 @@ impl Refinement {
         self.counters.phong_pixels = pixels;
     }
 
-    /// Makes all visible triangles candidates, which takes [`collecting_ns`](Self::collecting_ns).
+    /// Makes all visible triangles candidates, which takes [`collecting_ns`](Self::collecting_ns), and ranks them by their errors for
+    /// [`light`](Self::light).
     pub(in crate::frame) fn collect_everything(&mut self, stage: &Stage<'_>) {
         let first = self.roots.len();
         self.take_up(stage, f32::INFINITY);
         self.collect_from(stage, first);
+        self.by_error.clear();
+        let ranks = self.by_error.extend(self.roots.len());
+        for (root, rank) in self.roots.iter().zip(ranks) {
+            if root.prior > LOOK_ERROR {
+                *rank = Rank::new(root.prior);
+            }
+        }
+        self.by_error.admit(0);
     }
 
     /// What that takes as a rule, in nominal nanoseconds.
@@ -64,7 +75,7 @@ impl Refinement {
         f64::from(cost::collecting(triangles, lights) + samples)
     }
 
-    /// Lights collected triangles and notes them in `lit`: those first whose pixels are expected to be furthest off, and none that seems
+    /// Lights triangles that have just been collected, and notes them in `lit`: those first whose pixels are expected to be furthest off, and none that seems
     /// right. Their pixels are right as soon as the first image is drawn.
     pub(in crate::frame) fn light(
         &mut self,
@@ -73,14 +84,6 @@ impl Refinement {
         lit: &mut TriangleSet,
     ) -> LitTriangles {
         self.lit_shading = RootShading::lit(world.lights.len());
-        self.by_error.clear();
-        let ranks = self.by_error.extend(self.roots.len());
-        for (root, rank) in self.roots.iter().zip(ranks) {
-            if root.prior > LOOK_ERROR {
-                *rank = Rank::new(root.prior);
-            }
-        }
-        self.by_error.admit(0);
         let mut done = LitTriangles::default();
         while let Some(index) = self.by_error.pop() {
             let root = self.roots[index as usize];

@@ -176,12 +176,13 @@ impl Renderer {
                 let slowness = studio.stages.slowness(studio.predicted);
                 allowance.has_time_for((colouring_ms + handing_over_ms) * slowness)
             };
+            let mut is_in_time = has_time(picture, &studio);
             // Rather a plain image than none.
-            if !(is_colouring_due || has_time(picture, &studio) || picture.composition().is_plain())
-            {
+            if !is_in_time && !picture.composition().is_plain() {
                 picture.decompose(studio.world);
+                is_in_time = has_time(picture, &studio);
             }
-            let may_begin = is_colouring_due || has_time(picture, &studio);
+            let may_begin = is_colouring_due || is_in_time;
             if !may_begin || !picture.colour(&mut studio, allowance, true) {
                 return false;
             }
