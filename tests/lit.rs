@@ -88,7 +88,7 @@ fn an_image_lit_after_a_refined_one_is_like_any_other() {
     assert!(refined.leaves > 0 && refined.pht > 0, "{refined:?}");
 
     let mut moved = scene.clone();
-    let mut camera = scene.camera().clone();
+    let mut camera = *scene.camera();
     camera.position.x += 0.1;
     moved.set_camera(camera);
     let everything = composed(0, FrameRecord::EVERYTHING);
