@@ -64,15 +64,7 @@ pub(super) fn calibrate(
 
 fn rounds(renderer: &mut Renderer, exec: Exec, clock: &dyn Clock, start_ms: f64, scene: &Scene) {
     let cancel = CancelToken::new();
-    let replay = |divisor, lit| {
-        Budget::Replay(FrameRecord {
-            is_timed: true,
-            divisor,
-            images: 1,
-            lit: [lit, 0],
-            ..FrameRecord::default()
-        })
-    };
+    let replay = |divisor, lit| Budget::Replay(FrameRecord::of_first_image(divisor, lit));
     let budgets = [Budget::Work(UNITS), replay(1, LIT), replay(2, 0)];
     let mut frame = Frame::new(SIZE[0], SIZE[1]);
     for round in 0..MOST_ROUNDS {

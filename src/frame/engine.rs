@@ -170,15 +170,7 @@ impl Engine {
     pub fn warm_up(&mut self, scene: &Scene, width: u32, height: u32) {
         let mut frame = Frame::new(width, height);
         let frames = self.renderer.frames;
-        let replay = |divisor, lit| {
-            Budget::Replay(FrameRecord {
-                is_timed: true,
-                divisor,
-                images: 1,
-                lit: [lit, 0],
-                ..FrameRecord::default()
-            })
-        };
+        let replay = |divisor, lit| Budget::Replay(FrameRecord::of_first_image(divisor, lit));
         // An image of a lower resolution has memory of its own.
         let (reduced, lit) = (replay(2, 0), replay(1, WARM_UP_LIT));
         let refined = Budget::Work(WARM_UP_UNITS);

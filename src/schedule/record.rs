@@ -30,6 +30,18 @@ pub struct FrameRecord {
 impl FrameRecord {
     /// See [`lit`](Self::lit).
     pub const EVERYTHING: u32 = u32::MAX;
+
+    /// A timed frame that draws one first image, so much smaller and with so many triangles [lit](Self::lit), and does nothing else.
+    #[must_use]
+    pub fn of_first_image(divisor: u32, lit: u32) -> Self {
+        Self {
+            is_timed: true,
+            divisor,
+            images: 1,
+            lit: [lit, 0],
+            ..Self::default()
+        }
+    }
 }
 
 impl Default for FrameRecord {

@@ -86,8 +86,9 @@ impl Picture {
         handing_over_ms: f64,
         is_asked_for: bool,
     ) {
-        // Under a budget of another kind it is composed in another way, and so does a replay of this frame.
-        let is_stale = self.is_composed_in_time != allowance.is_timed();
+        // Under a budget of another kind it is composed in another way, and so it is in a replay of this frame.
+        let depends_on_it = self.is_planned || !self.composition.is_plain();
+        let is_stale = depends_on_it && self.is_composed_in_time != allowance.is_timed();
         if is_stale && (self.pass == Pass::Coloured || self.pass == Pass::Colouring) {
             self.enter(Pass::Colouring);
         }
